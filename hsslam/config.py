@@ -1,0 +1,280 @@
+"""Every setting of a SLAM run in one typed place: YAML in, validated; resolved YAML out.
+
+A matcher is chosen by its name alone (``matcher: hide``) or with parameters
+(``matcher: {name: hide, memory_size: 40}``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from copy import deepcopy
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_serializer, model_validator
+
+from hsslam.errors import ConfigError
+from hsslam.matching import registry
+from hsslam.matching.interface import Matcher, MatcherConfig
+from hsslam.validation import explain
+
+
+class Section(BaseModel):
+    """Base of every section: unknown keys are errors, values do not change after validation."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class MatcherSection(BaseModel):
+    """A matcher by name, with its parameters beside the name; resolved against the matcher's own model."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+
+    name: str = Field(description="a name that `hsslam matchers` lists")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _name_alone(cls, value: Any) -> Any:
+        return {"name": value} if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _resolve(self) -> MatcherSection:
+        self.parameters  # noqa: B018  (validates, so that a bad parameter is found when the config is read)
+        return self
+
+    @property
+    def parameters(self) -> MatcherConfig:
+        """The matcher's validated parameters.
+
+        Raises
+        ------
+        ConfigError
+            Unknown matcher, unknown parameter, or a value out of its range.
+        MatcherUnavailableError
+            The matcher's module cannot be imported.
+        """
+        model = registry.load(self.name).Config
+        try:
+            return model.model_validate(self.__pydantic_extra__ or {})
+        except ValidationError as error:
+            raise ConfigError(explain(error, model, prefix=self.name)) from error
+
+    def create(self) -> Matcher[Any]:
+        """Make the matcher; raises what `hsslam.matching.create` does."""
+        return registry.create(self.name, self.__pydantic_extra__ or {})
+
+    @model_serializer
+    def _resolved(self) -> dict[str, Any]:
+        return {"name": self.name, **self.parameters.model_dump()}
+
+
+class WindowSection(Section):
+    """How far the truth may be from the prediction."""
+
+    half_x: float = Field(gt=0.0, description="half side of the search window along x (m)")
+    half_y: float = Field(gt=0.0, description="half side of the search window along y (m)")
+    half_theta_deg: float = Field(gt=0.0, le=180.0, description="half its extent in heading (deg)")
+
+
+class TrackerSection(Section):
+    """Front end: every scan against the local submap."""
+
+    window: WindowSection = WindowSection(half_x=0.2, half_y=0.2, half_theta_deg=10.0)
+    min_score: float = Field(0.5, ge=0.0, le=1.0, description="below this score odometry is trusted instead")
+
+
+class KeyframeSection(Section):
+    """When a scan becomes a keyframe, and how many make a submap."""
+
+    distance: float = Field(0.2, gt=0.0, description="a keyframe after this much travel (m)")
+    angle_deg: float = Field(10.0, gt=0.0, description="or after this much turning (deg)")
+    submap_size: int = Field(10, ge=1, description="newest keyframes in the local submap")
+
+
+class LoopSection(Section):
+    """Loop closure: candidates near by, matched over a wide window, verified."""
+
+    enabled: bool = Field(True, description="look for loops at all")
+    radius: float = Field(3.0, gt=0.0, description="candidates within this distance of the estimate (m)")
+    min_gap: int = Field(20, ge=1, description="keyframes between the two ends of a loop, at least")
+    submap_half: int = Field(4, ge=0, description="keyframes either side of the candidate in its submap")
+    every: int = Field(1, ge=1, description="look for a loop at every n-th keyframe")
+    candidates: int = Field(2, ge=1, description="candidates tried per keyframe, nearest first")
+    window: WindowSection = WindowSection(half_x=1.0, half_y=1.0, half_theta_deg=20.0)
+    min_score: float = Field(0.6, ge=0.0, le=1.0, description="share of points a loop must explain")
+    max_std: float = Field(0.2, gt=0.0, description="largest standard deviation of an accepted loop (m)")
+
+
+class GraphSection(Section):
+    """Back end: the GTSAM pose graph."""
+
+    robust: Literal["cauchy", "gnc", "none"] = Field("cauchy", description="loss on loop factors at the end")
+    robust_scale: float = Field(1.0, gt=0.0, description="scale of the robust loss (standard deviations)")
+    odometry_std_xy: float = Field(
+        0.1, gt=0.0, description="standard deviation per metre where odometry stands in for a match (m/m)"
+    )
+    odometry_std_theta_deg: float = Field(
+        5.0, gt=0.0, description="its standard deviation of heading per radian turned or metre driven (deg)"
+    )
+    refine_rounds: int = Field(1, ge=0, description="rounds of matching overlapping keyframes again at the end")
+    overlap_radius: float = Field(3.0, gt=0.0, description="keyframes within this distance may overlap (m)")
+    overlap_neighbours: int = Field(8, ge=1, description="overlapping keyframes matched with each, at most")
+    overlap_half_xy: float = Field(0.15, gt=0.0, description="half side of the window of such a match (m)")
+    overlap_half_theta_deg: float = Field(5.0, gt=0.0, description="half its extent in heading (deg)")
+    overlap_min_score: float = Field(0.5, ge=0.0, le=1.0, description="share of points such a match must explain")
+
+
+class MapSection(Section):
+    """The occupancy grid."""
+
+    resolution: float = Field(0.05, gt=0.0, description="side of a cell (m)")
+    max_range: float = Field(30.0, gt=0.0, description="beams are cut at this range (m)")
+
+
+class Config(Section):
+    """Everything that decides what a SLAM run does."""
+
+    seed: int = Field(0, ge=0, description="every random choice follows from it")
+    matcher: MatcherSection = Field(
+        default_factory=lambda: MatcherSection(name="hide"), description="tracks every scan"
+    )
+    loop_matcher: MatcherSection | None = Field(None, description="closes loops; the tracker's where left out")
+    tracker: TrackerSection = TrackerSection()
+    keyframes: KeyframeSection = KeyframeSection()
+    loops: LoopSection = LoopSection()
+    graph: GraphSection = GraphSection()
+    map: MapSection = MapSection()
+
+
+def load_config(
+    path: Path | str | None = None,
+    overrides: Iterable[str] = (),
+    base: Mapping[str, Any] | None = None,
+    chosen: Mapping[str, Any] | None = None,
+) -> Config:
+    """Read a config.
+
+    Parameters
+    ----------
+    path : path, optional
+        A YAML file; the defaults where left out.
+    overrides : iterable of str
+        ``dotted.key=value`` pairs that win over the file; values are YAML.
+    base : mapping, optional
+        Settings under the file's.
+    chosen : mapping, optional
+        Settings over the file's and under the overrides, e.g. a matcher chosen on the command line.
+
+    Raises
+    ------
+    ConfigError
+        One line: the file, the key, what was expected and what was found; unknown keys with a suggestion.
+    """
+    data = merge(deepcopy(dict(base or {})), read_yaml(path) if path is not None else {})
+    data = merge(data, deepcopy(dict(chosen or {})))
+    for override in overrides:
+        apply_override(data, override)
+    return validate(Config, data, source=str(path) if path is not None else "")
+
+
+_Model = TypeVar("_Model", bound=BaseModel)
+
+
+def validate(model: type[_Model], data: Mapping[str, Any], source: str = "") -> _Model:
+    """Validate plain data against a model; see `load_config` for what is raised."""
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        where = f"{source}: " if source else ""
+        raise ConfigError(where + explain(error, model)) from error
+
+
+def read_yaml(path: Path | str) -> dict[str, Any]:
+    """Read a YAML mapping with the safe loader.
+
+    Raises
+    ------
+    ConfigError
+        The file is not there, is no YAML, or holds something else than a mapping.
+    """
+    try:
+        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f":{mark.line + 1}" if mark is not None else ""
+        raise ConfigError(f"{path}{line}: not YAML: {getattr(error, 'problem', error)}") from error
+    if data is None:
+        return {}
+    if not isinstance(data, dict):
+        raise ConfigError(f"{path}: expected settings (key: value), found {type(data).__name__}")
+    return data
+
+
+def apply_override(data: dict[str, Any], override: str) -> None:
+    """Put one ``dotted.key=value`` into nested settings, in place.
+
+    A matcher given by its bare name becomes a mapping when one of its parameters is set.
+
+    Raises
+    ------
+    ConfigError
+        If the text is not of that form.
+    """
+    key, equals, text = override.partition("=")
+    parts = key.strip().split(".")
+    if not equals or not all(parts):
+        raise ConfigError(f"--set takes key=value, e.g. matcher.memory_size=40, found {override!r}")
+    try:
+        value = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise ConfigError(f"--set {key}: not a YAML value: {text!r}") from error
+    node = data
+    for part in parts[:-1]:
+        inner = node.get(part)
+        if isinstance(inner, str):
+            inner = {"name": inner}
+        elif inner is None:
+            inner = {"name": _implied_matcher(part, data)} if part in _MATCHERS and node is data else {}
+        elif not isinstance(inner, dict):
+            raise ConfigError(f"--set {key}: {part} holds {inner!r}, which has no settings of its own")
+        node[part] = inner
+        node = inner
+    node[parts[-1]] = value
+
+
+def merge(under: dict[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested settings ``over`` laid on ``under``; a new dict.
+
+    The parameters of a matcher stay as long as its name does: another matcher starts from its own defaults.
+    """
+    out = dict(under)
+    for key, value in over.items():
+        below = out.get(key)
+        if key in _MATCHERS:
+            below, value = _by_name(below), _by_name(value)
+        if isinstance(below, dict) and isinstance(value, dict) and value.get("name") in (None, below.get("name")):
+            out[key] = merge(below, value)
+        else:
+            out[key] = value
+    return out
+
+
+_MATCHERS = ("matcher", "loop_matcher")
+
+
+def _by_name(value: Any) -> Any:
+    return {"name": value} if isinstance(value, str) else value
+
+
+def _implied_matcher(key: str, data: Mapping[str, Any]) -> str:
+    """The matcher that ``key`` stands for where nothing names one: loops are closed by the tracker's."""
+    tracker = _by_name(data.get("matcher")) if key == "loop_matcher" else None
+    return str((tracker or {}).get("name") or Config().matcher.name)
+
+
+def dump(config: BaseModel) -> str:
+    """The resolved config as YAML, every value in it."""
+    return yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False)

@@ -1,0 +1,66 @@
+"""What a result was computed with: versions, processor, system."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from hsslam.version import __version__
+
+_PACKAGES = ("numpy", "numba", "scipy", "gtsam", "pydantic", "matplotlib", "kiss-icp", "open3d", "open3d-cpu")
+
+
+def environment() -> dict[str, Any]:
+    """Describe this machine and installation; imports nothing of what it reports.
+
+    Returns
+    -------
+    dict
+        ``hsslam``, ``python``, ``packages`` (name to version, of those installed), ``cpu`` (model),
+        ``cores`` (that this process may use), ``system``, ``machine``; JSON types only.
+    """
+    return {
+        "hsslam": __version__,
+        "python": platform.python_version(),
+        "packages": _versions(),
+        "cpu": cpu_model(),
+        "cores": _cores(),
+        "system": f"{platform.system()} {platform.release()}",
+        "machine": platform.machine(),
+    }
+
+
+def cpu_model() -> str:
+    """Name of the processor; the architecture where the system does not tell."""
+    if sys.platform == "darwin":
+        asked = subprocess.run(
+            ["sysctl", "-n", "machdep.cpu.brand_string"], capture_output=True, text=True, check=False
+        )
+        return asked.stdout.strip() or platform.machine()
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.machine())
+
+
+def _cores() -> int:
+    if sys.platform == "linux":
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in _PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found

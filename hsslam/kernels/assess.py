@@ -1,0 +1,89 @@
+"""How well a scan lies on a reference's surface at a pose: score and covariance, the same for every matcher."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam.jit import kernel
+from hsslam.kernels.surface import Surface, nearest_segment, squared_distance
+from hsslam.se2 import Points, Pose
+
+RANGE_STD = 0.01
+"""Standard deviation (m) of a return across the surface, at least: the noise of indoor scanners."""
+
+CORRELATION = 6.0
+"""Returns that share an error (a bent wall, a bad line fit, a moved chair) counted as one independent return."""
+
+
+def assess(
+    surface: Surface, points: Points, pose: Pose, half: NDArray[np.float64], distance: float
+) -> tuple[float, NDArray[np.float64]]:
+    """Score and covariance of a scan at a pose.
+
+    Parameters
+    ----------
+    surface : Surface
+        Of the reference.
+    points : Points
+        (N, 2) m, the scan.
+    pose : Pose
+        Of the scan in the reference's frame.
+    half : float64 (3,)
+        Half sides of the search window (m, m, rad): what is known of a direction that the points leave open.
+    distance : float
+        Points within it of the surface count as matched (m), at most the surface's reach.
+
+    Returns
+    -------
+    score : float
+        Share of the points within ``distance`` of the surface.
+    covariance : float64 (3, 3)
+        Inverse of the information that the matched points hold about the pose across their lines (the
+        Gauss-Newton Hessian of point-to-line distances over their variance), plus that of the window.
+    """
+    matched, information = gather(
+        surface.segments, surface.lines, surface.nearest, surface.frame, points, pose, distance
+    )
+    information += np.diag(3.0 / np.maximum(half, 1e-3) ** 2)
+    covariance = np.linalg.inv(information)
+    return matched / max(len(points), 1), 0.5 * (covariance + covariance.T)
+
+
+@kernel
+def gather(
+    segments: NDArray[np.float64],
+    lines: NDArray[np.float64],
+    nearest: NDArray[np.int32],
+    frame: NDArray[np.float64],
+    points: Points,
+    pose: Pose,
+    distance: float,
+) -> tuple[int, NDArray[np.float64]]:
+    """Count the points within ``distance`` of the surface, and sum their information (3, 3)."""
+    information = np.zeros((3, 3))
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    matched = 0
+    squared_residuals = 0.0
+    gradient = np.empty(3)
+    for i in range(points.shape[0]):
+        rx = c * points[i, 0] - s * points[i, 1]
+        ry = s * points[i, 0] + c * points[i, 1]
+        x, y = pose[0] + rx, pose[1] + ry
+        k = nearest_segment(nearest, frame, x, y)
+        if k < 0 or squared_distance(segments[k], x, y) > distance * distance:
+            continue
+        matched += 1
+        nx, ny = lines[k, 2], lines[k, 3]
+        residual = nx * (x - lines[k, 0]) + ny * (y - lines[k, 1])
+        squared_residuals += min(residual * residual, distance * distance)
+        gradient[0], gradient[1], gradient[2] = nx, ny, ny * rx - nx * ry
+        for a in range(3):
+            for b in range(3):
+                information[a, b] += gradient[a] * gradient[b]
+    if matched > 0:
+        variance = max(squared_residuals / matched, RANGE_STD * RANGE_STD)
+        information /= variance * CORRELATION
+    return matched, information

@@ -1,0 +1,67 @@
+"""Fitness of a pose: how many of a scan's points hit a raster (paper, equations 9 and 10)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam.jit import kernel
+
+CHUNK = 64
+"""Points counted between two looks at whether the candidate can still win."""
+
+
+@kernel
+def count_hits(
+    cells: NDArray[np.uint8],
+    frame: NDArray[np.float64],
+    xs: NDArray[np.float32],
+    ys: NDArray[np.float32],
+    x: float,
+    y: float,
+    theta: float,
+    at_least: int,
+) -> int:
+    """Points that hit the raster at a pose, or -1 as soon as fewer than ``at_least`` can.
+
+    Parameters
+    ----------
+    cells : uint8 (H, W)
+        A `Raster`'s cells; its border must be zero.
+    frame : float64 (3,)
+        The raster's frame.
+    xs, ys : float32 (N,)
+        The scan's points in cells (metres times ``frame[2]``).
+    x, y, theta : float
+        Candidate pose (m, m, rad).
+    at_least : int
+        Hits below which the count is of no interest.
+    """
+    rows, columns = cells.shape
+    flat = cells.reshape(rows * columns)
+    right, top = np.float32(columns - 1), np.float32(rows - 1)
+    zero = np.float32(0.0)
+    c, s = np.float32(math.cos(theta)), np.float32(math.sin(theta))
+    tx = np.float32((x - frame[0]) * frame[2])
+    ty = np.float32((y - frame[1]) * frame[2])
+    n = xs.shape[0]
+    index = np.empty(CHUNK, dtype=np.int32)
+    hits = 0
+    start = 0
+    while start < n:
+        stop = min(start + CHUNK, n)
+        # Two plain loops: the first becomes vector instructions, which the look-up in the second cannot.
+        for i in range(stop - start):
+            u = c * xs[start + i] - s * ys[start + i] + tx
+            v = s * xs[start + i] + c * ys[start + i] + ty
+            u = min(max(u, zero), right)
+            v = min(max(v, zero), top)
+            index[i] = np.int32(v) * np.int32(columns) + np.int32(u)
+        for i in range(stop - start):
+            hits += flat[index[i]]
+        start = stop
+        if hits + n - start < at_least:
+            return -1
+    return hits

@@ -1,0 +1,112 @@
+"""Local refinement of a pose: robust point-to-line Gauss-Newton on a reference's surface."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam.jit import kernel
+from hsslam.kernels.surface import nearest_segment, squared_distance
+from hsslam.se2 import Points, Pose, wrap
+
+
+@kernel
+def refine(
+    segments: NDArray[np.float64],
+    lines: NDArray[np.float64],
+    nearest: NDArray[np.int32],
+    frame: NDArray[np.float64],
+    points: Points,
+    start: Pose,
+    iterations: int,
+    distance_start: float,
+    distance_end: float,
+    scale: float,
+) -> tuple[Pose, int, bool]:
+    """Minimise the Cauchy-weighted distances of points from the lines of their nearest segments.
+
+    Parameters
+    ----------
+    segments, lines, nearest, frame : arrays
+        Of a `Surface`.
+    points : Points
+        (N, 2) m.
+    start : Pose
+        Where to begin.
+    iterations : int
+        At most.
+    distance_start, distance_end : float
+        Points further than this from the surface are left out (m); shrinks from iteration to iteration.
+    scale : float
+        Of the Cauchy weight ``1 / (1 + (r / scale)^2)`` (m).
+
+    Returns
+    -------
+    (Pose, int, bool)
+        The refined pose, iterations spent, and whether the last step was shorter than 0.1 mm and 0.1 mrad.
+    """
+    pose = start.copy()
+    hessian = np.empty((3, 3))
+    right = np.empty(3)
+    step = np.empty(3)
+    for iteration in range(iterations):
+        hessian[:] = 0.0
+        right[:] = 0.0
+        share = iteration / max(iterations - 1, 1)
+        distance = max(distance_end, distance_start * (1.0 - 2.0 * share))
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        used = 0
+        for i in range(points.shape[0]):
+            rx = c * points[i, 0] - s * points[i, 1]
+            ry = s * points[i, 0] + c * points[i, 1]
+            x, y = pose[0] + rx, pose[1] + ry
+            k = nearest_segment(nearest, frame, x, y)
+            if k < 0 or squared_distance(segments[k], x, y) > distance * distance:
+                continue
+            nx, ny = lines[k, 2], lines[k, 3]
+            residual = nx * (x - lines[k, 0]) + ny * (y - lines[k, 1])
+            weight = 1.0 / (1.0 + (residual / scale) * (residual / scale))
+            nt = ny * rx - nx * ry
+            used += 1
+            hessian[0, 0] += weight * nx * nx
+            hessian[0, 1] += weight * nx * ny
+            hessian[0, 2] += weight * nx * nt
+            hessian[1, 1] += weight * ny * ny
+            hessian[1, 2] += weight * ny * nt
+            hessian[2, 2] += weight * nt * nt
+            right[0] -= weight * nx * residual
+            right[1] -= weight * ny * residual
+            right[2] -= weight * nt * residual
+        if used < 3:
+            return start.copy(), iteration, False
+        # Damping in proportion to the whole: a direction that no line fixes (along a corridor) stays put.
+        damping = 1e-3 * (hessian[0, 0] + hessian[1, 1]) + 1e-9
+        hessian[0, 0] += damping
+        hessian[1, 1] += damping
+        hessian[2, 2] += damping
+        solve3(hessian, right, step)
+        pose[0] += step[0]
+        pose[1] += step[1]
+        pose[2] = wrap(pose[2] + step[2])
+        if distance <= distance_end and abs(step[0]) + abs(step[1]) < 1e-4 and abs(step[2]) < 1e-4:
+            return pose, iteration + 1, True
+    return pose, iterations, False
+
+
+@kernel
+def solve3(hessian: NDArray[np.float64], right: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    """Solve a symmetric positive definite 3 x 3 system given by its upper triangle; into ``out`` (3,)."""
+    l00 = math.sqrt(hessian[0, 0])
+    l10 = hessian[0, 1] / l00
+    l20 = hessian[0, 2] / l00
+    l11 = math.sqrt(max(hessian[1, 1] - l10 * l10, 1e-12))
+    l21 = (hessian[1, 2] - l20 * l10) / l11
+    l22 = math.sqrt(max(hessian[2, 2] - l20 * l20 - l21 * l21, 1e-12))
+    y0 = right[0] / l00
+    y1 = (right[1] - l10 * y0) / l11
+    y2 = (right[2] - l20 * y0 - l21 * y1) / l22
+    out[2] = y2 / l22
+    out[1] = (y1 - l21 * out[2]) / l11
+    out[0] = (y0 - l10 * out[1] - l20 * out[2]) / l00

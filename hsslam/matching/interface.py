@@ -1,0 +1,277 @@
+"""The one interface: what a matcher is given and what it gives back.
+
+A plugin subclasses `Matcher` and writes `Matcher.estimate`, which finds a pose. Everything that must mean the
+same for every matcher - input checks, rejection of answers outside the window, score, covariance - happens
+once, in `Matcher.match`, which plugins inherit and do not override.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar, Generic, TypeVar, final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from hsslam.kernels.assess import assess
+from hsslam.kernels.surface import Surface
+from hsslam.se2 import Points, Pose, wrap
+
+MINIMUM_POINTS = 3
+"""Fewer points than this, on either side, fix no pose."""
+
+
+class MatcherConfig(BaseModel):
+    """Parameters every matcher has; a plugin's own come in a subclass."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    score_distance: float = Field(
+        0.10, gt=0.0, le=0.25, description="a point within this distance of the reference surface counts as matched (m)"
+    )
+
+
+@dataclass(frozen=True)
+class SearchWindow:
+    """How far the truth may be from the guess, along each axis of the reference's frame.
+
+    Parameters
+    ----------
+    half_x, half_y : float
+        Half sides of the box (m).
+    half_theta : float
+        Half its height (rad).
+    """
+
+    half_x: float
+    half_y: float
+    half_theta: float
+
+    @cached_property
+    def half(self) -> NDArray[np.float64]:
+        """The three half sides as an array."""
+        return np.array([self.half_x, self.half_y, self.half_theta])
+
+    def contains(self, guess: Pose, pose: Pose, tolerance: float = 1e-9) -> bool:
+        """Whether ``pose`` is inside the window around ``guess``."""
+        return (
+            abs(pose[0] - guess[0]) <= self.half_x + tolerance
+            and abs(pose[1] - guess[1]) <= self.half_y + tolerance
+            and abs(wrap(pose[2] - guess[2])) <= self.half_theta + tolerance
+        )
+
+
+class Reference:
+    """What scans are matched against: the points of a scan or of a submap, in one frame.
+
+    A plugin that needs an index of its own (a tree, a raster) subclasses this and fills it in
+    `Matcher.prepare`; one reference then serves any number of matches, from any number of threads.
+
+    Parameters
+    ----------
+    points : Points
+        (N, 2) m. Neighbours in the array that are close to one another are taken for neighbours on a
+        surface, so keep a scan's beams in their order; scans may follow one another.
+    """
+
+    def __init__(self, points: Points) -> None:
+        self.points = points
+
+    @cached_property
+    def surface(self) -> Surface:
+        """Surface through the points: what `MatchResult.score` and the covariance are measured on."""
+        return Surface.build(self.points)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a plugin found.
+
+    Parameters
+    ----------
+    pose : Pose
+        Pose of the scan in the reference's frame.
+    converged : bool
+        Whether the method says of itself that it succeeded.
+    evaluations : int
+        Fitness evaluations or iterations spent, all included.
+    covariance : float64 (3, 3), optional
+        Of the pose, if the method has one of its own; else the framework computes one.
+    diagnostics : mapping
+        Anything else worth knowing; JSON types only.
+    """
+
+    pose: Pose
+    converged: bool = True
+    evaluations: int = 0
+    covariance: NDArray[np.float64] | None = None
+    diagnostics: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class MatchResult:
+    """The answer to one match.
+
+    Parameters
+    ----------
+    pose : Pose
+        Pose of the scan in the reference's frame. The guess itself where nothing better is known.
+    covariance : float64 (3, 3)
+        Of ``(x, y, theta)`` in the reference's frame (m, m, rad); always positive definite.
+    score : float
+        Share of the scan's points, in [0, 1], that lie within ``score_distance`` of the reference surface at
+        ``pose``: the same yardstick for every matcher.
+    converged : bool
+        False where the method failed, or its answer was rejected.
+    evaluations : int
+        Fitness evaluations or iterations spent.
+    diagnostics : mapping
+        ``rejected`` tells why an answer was refused; the rest is the method's own.
+    """
+
+    pose: Pose
+    covariance: NDArray[np.float64]
+    score: float
+    converged: bool
+    evaluations: int
+    diagnostics: Mapping[str, Any] = field(default_factory=dict)
+
+
+ConfigT = TypeVar("ConfigT", bound=MatcherConfig)
+
+
+class Matcher(ABC, Generic[ConfigT]):
+    """Finds the pose of a scan in the frame of a reference.
+
+    A matcher holds no state between calls beyond its config: the same inputs and the same generator give the
+    same result, and two threads may use one matcher.
+
+    Parameters
+    ----------
+    config : MatcherConfig, optional
+        An instance of the class's ``Config``; its defaults if left out.
+
+    Raises
+    ------
+    MatcherUnavailableError
+        Where something the matcher needs is not installed, or does not work.
+    """
+
+    Config: ClassVar[type[MatcherConfig]] = MatcherConfig
+    summary: ClassVar[str] = ""
+    """One line for listings."""
+
+    def __init__(self, config: ConfigT | None = None) -> None:
+        self.check_available()
+        self.config: ConfigT = config if config is not None else self.Config()  # type: ignore[assignment]
+
+    @classmethod
+    def check_available(cls) -> None:  # noqa: B027  (most plugins need nothing and override nothing)
+        """Raise `MatcherUnavailableError` where a dependency is missing or broken."""
+
+    def prepare(self, points: Points) -> Reference:
+        """Make a reference of (N, 2) points; done once, used for many matches."""
+        return Reference(clean(points))
+
+    @abstractmethod
+    def estimate(
+        self,
+        reference: Reference,
+        points: Points,
+        guess: Pose,
+        window: SearchWindow,
+        rng: np.random.Generator,
+    ) -> Estimate:
+        """Find the pose of ``points`` in the frame of ``reference``: the method itself.
+
+        Called by `match` with finite points, at least `MINIMUM_POINTS` on each side. ``reference`` is what the
+        plugin's own `prepare` returned. Population searches look inside ``window`` around ``guess``; local
+        methods start at ``guess`` and may ignore the window: `match` rejects what left it.
+        """
+
+    @final
+    def match(
+        self,
+        reference: Reference,
+        points: Points,
+        guess: Pose,
+        window: SearchWindow,
+        rng: np.random.Generator,
+    ) -> MatchResult:
+        """Match a scan.
+
+        Parameters
+        ----------
+        reference : Reference
+            From this matcher's `prepare`.
+        points : Points
+            (N, 2) m, in the frame whose pose is sought. Rows that are not finite are ignored.
+        guess : Pose
+            Where the scan is thought to be, in the reference's frame.
+        window : SearchWindow
+            How far from it the truth may be.
+        rng : numpy.random.Generator
+            Source of every random choice.
+
+        Returns
+        -------
+        MatchResult
+            With fewer than `MINIMUM_POINTS` points on a side, or an answer that is not finite or outside the
+            window: the guess, ``converged=False``, and the reason under ``diagnostics["rejected"]``.
+
+        Raises
+        ------
+        ValueError
+            Points not of shape (N, 2), or a guess that is not three finite numbers.
+        """
+        points = clean(points)
+        guess = np.ascontiguousarray(guess, dtype=np.float64)
+        if guess.shape != (3,) or not np.isfinite(guess).all():
+            raise ValueError(f"a guess is three finite numbers (x m, y m, theta rad), not {guess!r}")
+        if len(points) < MINIMUM_POINTS or len(reference.points) < MINIMUM_POINTS:
+            few = "scan" if len(points) < MINIMUM_POINTS else "reference"
+            return MatchResult(
+                pose=guess.copy(),
+                covariance=np.diag(np.maximum(window.half, 1e-3) ** 2),
+                score=0.0,
+                converged=False,
+                evaluations=0,
+                diagnostics={"rejected": f"the {few} has fewer than {MINIMUM_POINTS} points"},
+            )
+        found = self.estimate(reference, points, guess, window, rng)
+        pose, converged, diagnostics = found.pose, found.converged, found.diagnostics
+        covariance = found.covariance
+        if not np.isfinite(pose).all() or not window.contains(guess, pose):
+            why = "left the search window" if np.isfinite(pose).all() else "is not finite"
+            diagnostics = {**diagnostics, "rejected": f"the answer {why}"}
+            pose, converged, covariance = guess, False, None
+        pose = np.array([pose[0], pose[1], wrap(pose[2])])
+        score, estimated = assess(reference.surface, points, pose, window.half, self.config.score_distance)
+        return MatchResult(
+            pose=pose,
+            covariance=estimated if covariance is None else covariance,
+            score=score,
+            converged=converged,
+            evaluations=found.evaluations,
+            diagnostics=diagnostics,
+        )
+
+
+def clean(points: Points) -> Points:
+    """Finite rows of ``points`` as contiguous float64 (N, 2).
+
+    Raises
+    ------
+    ValueError
+        If the array is not of shape (N, 2).
+    """
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ValueError(f"points are an array of shape (N, 2), not {points.shape}")
+    if np.isfinite(points).all():
+        return points
+    return np.ascontiguousarray(points[np.isfinite(points).all(axis=1)])

@@ -1,0 +1,18 @@
+"""Population searches over a box around a guess: harmony search, differential evolution, HIDE, genetic."""
+
+from hsslam.search.fitness import FITNESS_NAMES, HitFitness
+from hsslam.search.genetic import genetic_search
+from hsslam.search.harmony import harmony_search
+from hsslam.search.hide import hide_search
+from hsslam.search.population import PopulationConfig, PopulationMatcher, PopulationReference
+
+__all__ = [
+    "FITNESS_NAMES",
+    "HitFitness",
+    "PopulationConfig",
+    "PopulationMatcher",
+    "PopulationReference",
+    "genetic_search",
+    "harmony_search",
+    "hide_search",
+]

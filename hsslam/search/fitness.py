@@ -1,0 +1,60 @@
+"""Fitness functions by name: what a population search maximises."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam.kernels.raster import Raster
+from hsslam.kernels.surface import Surface
+from hsslam.se2 import Points
+
+FitnessName: TypeAlias = Literal["paper", "surface"]
+FITNESS_NAMES: tuple[str, ...] = get_args(FitnessName)
+
+
+@dataclass(frozen=True, eq=False)
+class HitFitness:
+    """Counts a scan's points that hit a raster (paper, equations 9 and 10); one per match.
+
+    Parameters
+    ----------
+    cells, frame : arrays
+        Of the reference's `Raster`.
+    xs, ys : float32 (N,)
+        The scan's points in cells.
+    """
+
+    cells: NDArray[np.uint8]
+    frame: NDArray[np.float64]
+    xs: NDArray[np.float32]
+    ys: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, raster: Raster, points: Points) -> HitFitness:
+        """Fitness of (N, 2) points against a raster."""
+        scaled = np.ascontiguousarray((points * raster.frame[2]).T, dtype=np.float32)
+        return cls(raster.cells, raster.frame, scaled[0], scaled[1])
+
+
+def build_raster(name: FitnessName, points: Points, surface: Surface, half_side: float, resolution: float) -> Raster:
+    """Rasterise a reference for a fitness function.
+
+    Parameters
+    ----------
+    name : str
+        ``paper``: squares centred on the points, as published. ``surface``: squares along the segments between
+        neighbouring points, so that a wall counts as a wall and not as the beams that happened to hit it.
+    points : Points
+        (N, 2) m, the reference.
+    surface : Surface
+        Through these points.
+    half_side, resolution : float
+        Of a square, and of a cell (m).
+    """
+    if name == "paper":
+        return Raster.of_points(points, half_side, resolution)
+    return Raster.build(surface.segments, half_side, resolution)

@@ -1,0 +1,129 @@
+"""HIDE: harmony memory improved by differential evolution (paper, section 5)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam.jit import kernel
+from hsslam.kernels.fitness import count_hits
+from hsslam.search.harmony import fill_memory, improvise
+from hsslam.se2 import Pose
+
+
+@kernel
+def evolve(
+    memory: NDArray[np.float64],
+    target: int,
+    best: int,
+    guess: Pose,
+    half: NDArray[np.float64],
+    attraction: float,
+    weight: float,
+    crossover_rate: float,
+    rng: np.random.Generator,
+    out: NDArray[np.float64],
+) -> None:
+    """Make the trial vector of one member (paper, equation 12: DE/rand-to-best/1); into ``out`` (3,).
+
+    ``x + lambda (best - x) + F (r1 - r2)`` with two members that differ from each other and from ``x``, then
+    binomial crossover with ``x``: at least one variable is the mutant's. Clipped to the window.
+    """
+    size = memory.shape[0]
+    first = int(rng.random() * (size - 1))
+    if first >= target:
+        first += 1
+    second = int(rng.random() * (size - 2))
+    if second >= min(first, target):
+        second += 1
+    if second >= max(first, target):
+        second += 1
+    forced = int(rng.random() * 3)
+    for d in range(3):
+        value = memory[target, d]
+        if d == forced or rng.random() < crossover_rate:
+            value += attraction * (memory[best, d] - value) + weight * (memory[first, d] - memory[second, d])
+        out[d] = min(max(value, guess[d] - half[d]), guess[d] + half[d])
+
+
+@kernel
+def hide_search(
+    cells: NDArray[np.uint8],
+    frame: NDArray[np.float64],
+    xs: NDArray[np.float32],
+    ys: NDArray[np.float32],
+    guess: Pose,
+    half: NDArray[np.float64],
+    memory_size: int,
+    memory_considering_rate: float,
+    pitch_adjusting_rates: tuple[float, float],
+    bandwidth_min: NDArray[np.float64],
+    bandwidth_max: NDArray[np.float64],
+    budget: int,
+    harmony_run: int,
+    attraction: float,
+    weight: float,
+    crossover_rate: float,
+    rng: np.random.Generator,
+) -> tuple[Pose, int, int]:
+    """Search the window for the pose with most hits (paper: HIDE, Fig. 5).
+
+    ``harmony_run`` improvisations, then a differential step of every harmony in turn, and so on until
+    ``budget`` evaluations are spent. Pitch adjustment and bandwidth follow the share of the budget spent.
+
+    Parameters
+    ----------
+    cells, frame, xs, ys, guess, half, memory_size, memory_considering_rate, pitch_adjusting_rates, \
+bandwidth_min, bandwidth_max, rng
+        As for `hsslam.search.harmony.harmony_search`.
+    budget : int
+        NFE: evaluations after the memory was filled.
+    harmony_run : int
+        HRT: improvisations between two differential steps.
+    attraction : float
+        lambda: pull towards the best harmony.
+    weight : float
+        F: weight of the difference of two harmonies.
+    crossover_rate : float
+        Share of variables taken from the mutant.
+
+    Returns
+    -------
+    (Pose, int, int)
+        Best harmony, its hits, and how often the fitness was evaluated, the memory's filling included.
+    """
+    memory = np.empty((memory_size, 3))
+    hits = np.empty(memory_size, dtype=np.int64)
+    fill_memory(cells, frame, xs, ys, guess, half, rng, memory, hits)
+    candidate = np.empty(3)
+    bandwidth = np.empty(3)
+    par_min, par_max = pitch_adjusting_rates
+    spent = 0
+    while spent < budget:
+        worst = int(np.argmin(hits))
+        for _ in range(min(harmony_run, budget - spent)):
+            share = spent / budget
+            for d in range(3):
+                bandwidth[d] = bandwidth_max[d] * math.exp(math.log(bandwidth_min[d] / bandwidth_max[d]) * share)
+            rate = par_min + (par_max - par_min) * share
+            improvise(memory, guess, half, memory_considering_rate, rate, bandwidth, rng, candidate)
+            found = count_hits(cells, frame, xs, ys, candidate[0], candidate[1], candidate[2], hits[worst] + 1)
+            spent += 1
+            if found > hits[worst]:
+                memory[worst] = candidate
+                hits[worst] = found
+                worst = int(np.argmin(hits))
+        best = int(np.argmax(hits))
+        for target in range(min(memory_size, budget - spent)):
+            evolve(memory, target, best, guess, half, attraction, weight, crossover_rate, rng, candidate)
+            found = count_hits(cells, frame, xs, ys, candidate[0], candidate[1], candidate[2], hits[target] + 1)
+            spent += 1
+            if found > hits[target]:
+                memory[target] = candidate
+                hits[target] = found
+                if found > hits[best]:
+                    best = target
+    best = int(np.argmax(hits))
+    return memory[best].copy(), hits[best], memory_size + spent

@@ -1,0 +1,97 @@
+"""What the population matchers share: a raster of the reference, a search over it, a local refinement."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from pydantic import Field
+
+from hsslam.kernels.raster import Raster
+from hsslam.kernels.refine import refine
+from hsslam.matching.interface import Estimate, Matcher, MatcherConfig, Reference, SearchWindow, clean
+from hsslam.search.fitness import FitnessName, HitFitness, build_raster
+from hsslam.se2 import Points, Pose
+
+FIRST_REACH = 0.15
+LAST_REACH = 0.08
+"""The refinement uses points this near to the surface (m), from the first iteration to the last."""
+
+CAUCHY_SCALE = 0.03
+"""Scale of the refinement's robust weight (m)."""
+
+
+class PopulationConfig(MatcherConfig):
+    """Parameters of the fitness and the refinement."""
+
+    fitness: FitnessName = Field(
+        "surface",
+        description="`paper`: squares around the reference's points; `surface`: squares along the segments between them",
+    )
+    half_side: float = Field(0.05, gt=0.0, le=1.0, description="half side of the squares of the fitness (m)")
+    resolution: float = Field(0.025, gt=0.0, le=0.5, description="side of a raster cell of the fitness (m)")
+    refine: bool = Field(True, description="polish the best pose by point-to-line Gauss-Newton")
+    refine_iterations: int = Field(12, ge=1, description="iterations of the refinement, at most")
+
+
+class PopulationReference(Reference):
+    """A reference with the raster that the search looks points up in."""
+
+    def __init__(self, points: Points, config: PopulationConfig) -> None:
+        super().__init__(points)
+        self.raster: Raster = build_raster(
+            config.fitness, points, self.surface, config.half_side, config.resolution
+        )
+
+
+PopulationConfigT = TypeVar("PopulationConfigT", bound=PopulationConfig)
+
+
+class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
+    """Base of matchers that search the window with a population, then refine the best pose.
+
+    A subclass writes `search`; a config of its own extends `PopulationConfig`.
+    """
+
+    def prepare(self, points: Points) -> PopulationReference:
+        """Rasterise a reference; see `hsslam.matching.Matcher.prepare`."""
+        return PopulationReference(clean(points), self.config)
+
+    @abstractmethod
+    def search(
+        self, fitness: HitFitness, guess: Pose, window: SearchWindow, rng: np.random.Generator
+    ) -> tuple[Pose, int, int]:
+        """Find the pose with most hits: the pose, its hits, evaluations spent."""
+
+    def estimate(
+        self,
+        reference: Reference,
+        points: Points,
+        guess: Pose,
+        window: SearchWindow,
+        rng: np.random.Generator,
+    ) -> Estimate:
+        """Search, then refine; a refinement that leaves the window is discarded."""
+        assert isinstance(reference, PopulationReference)
+        fitness = HitFitness.of(reference.raster, points)
+        found, hits, evaluations = self.search(fitness, guess, window, rng)
+        diagnostics: dict[str, Any] = {"fitness": hits / len(points)}
+        if not self.config.refine:
+            return Estimate(found, evaluations=evaluations, diagnostics=diagnostics)
+        surface = reference.surface
+        refined, iterations, _ = refine(
+            surface.segments,
+            surface.lines,
+            surface.nearest,
+            surface.frame,
+            points,
+            found,
+            self.config.refine_iterations,
+            FIRST_REACH,
+            LAST_REACH,
+            CAUCHY_SCALE,
+        )
+        diagnostics["refine_iterations"] = iterations
+        kept = window.contains(guess, refined)
+        return Estimate(refined if kept else found, evaluations=evaluations, diagnostics=diagnostics)

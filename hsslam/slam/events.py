@@ -1,0 +1,117 @@
+"""What the pipeline reports while it runs, and what it hands over at the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam.scan import LaserScan
+from hsslam.se2 import Pose
+from hsslam.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """A scan got its pose.
+
+    ``pose`` is the best known at that moment; ``relative`` is the scan seen from keyframe ``keyframe``;
+    ``matched`` is False where odometry had to stand in.
+    """
+
+    scan: int
+    stamp: float
+    pose: Pose
+    keyframe: int
+    relative: Pose
+    covariance: NDArray[np.float64]
+    score: float
+    matched: bool
+    evaluations: int
+
+
+@dataclass(frozen=True)
+class KeyframeAdded:
+    """A scan became keyframe number ``keyframe``."""
+
+    keyframe: int
+    scan: int
+    pose: Pose
+
+
+@dataclass(frozen=True)
+class LoopChecked:
+    """A loop candidate was tried: ``second`` seen from ``first`` (keyframes), accepted or why not."""
+
+    first: int
+    second: int
+    accepted: bool
+    reason: str
+    relative: Pose
+    covariance: NDArray[np.float64]
+    score: float
+    evaluations: int
+
+
+@dataclass(frozen=True)
+class Optimised:
+    """The whole graph was optimised: nonlinear error before and after; ``stage`` says which pass."""
+
+    stage: str
+    error_before: float
+    error_after: float
+    rejected_loops: int = 0
+
+
+Event: TypeAlias = Tracked | KeyframeAdded | LoopChecked | Optimised
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A relative pose between two keyframes: ``kind`` is ``odometry``, ``loop`` or ``overlap``."""
+
+    first: int
+    second: int
+    relative: Pose
+    covariance: NDArray[np.float64]
+    kind: str
+
+
+@dataclass(frozen=True)
+class SlamResult:
+    """The outcome of a run.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        A robot pose for every scan.
+    online : Trajectory
+        The pose of each scan as it was known when that scan was the newest.
+    odometry : Trajectory
+        The raw odometry of every scan.
+    keyframes : list of LaserScan
+        The keyframes' scans, in order.
+    keyframe_poses : float64 (K, 3)
+        Their final poses.
+    edges : list of Edge
+        Every constraint of the graph.
+    loops : list of LoopChecked
+        Every loop candidate tried.
+    matched : int
+        Scans whose pose came from a match, not from odometry.
+    seconds : dict
+        Wall time by stage (s): ``track``, ``prepare``, ``loops``, ``graph``, ``final``.
+    """
+
+    trajectory: Trajectory
+    online: Trajectory
+    odometry: Trajectory
+    keyframes: list[LaserScan]
+    keyframe_poses: NDArray[np.float64]
+    edges: list[Edge]
+    loops: list[LoopChecked]
+    matched: int
+    seconds: dict[str, float] = field(default_factory=dict)
+    statistics: dict[str, Any] = field(default_factory=dict)

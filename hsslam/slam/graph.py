@@ -1,0 +1,184 @@
+"""Back end: the GTSAM pose graph of keyframes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import gtsam
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam.config import GraphSection
+from hsslam.errors import HsslamError
+from hsslam.se2 import Pose, Poses, compose
+from hsslam.slam.events import Edge
+
+PRIOR_STD = 1e-4
+"""Of the first keyframe (m, rad): it defines the frame of the map."""
+
+FLOOR_STD_XY = 0.004
+FLOOR_STD_THETA = math.radians(0.1)
+"""No relative pose is trusted beyond this: errors that matches share do not show in their covariances."""
+
+
+class GraphError(HsslamError):
+    """A constraint or a solution is unusable."""
+
+
+class PoseGraph:
+    """Keyframe poses and the constraints between them.
+
+    While a run goes on, iSAM2 keeps the estimate; constraints of kind ``odometry`` alone do not move earlier
+    poses, so it is brought up to date only when something else was added.
+
+    Parameters
+    ----------
+    config : GraphSection
+        The robust loss and its scale.
+    start : Pose
+        Pose of keyframe 0.
+    """
+
+    def __init__(self, config: GraphSection, start: Pose) -> None:
+        self._config = config
+        self._start = start
+        self.edges: list[Edge] = []
+        self._poses = np.empty((1024, 3))
+        self._poses[0] = start
+        self._count = 1
+        self._isam = gtsam.ISAM2(gtsam.ISAM2Params())
+        self._new_factors = gtsam.NonlinearFactorGraph()
+        self._new_values = gtsam.Values()
+        self._new_values.insert(0, _pose2(start))
+        self._new_factors.add(_prior(start))
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def poses(self) -> Poses:
+        """(K, 3) current estimate; a view, not to be written to."""
+        return self._poses[: self._count]
+
+    def add_keyframe(self, relative: Pose, covariance: NDArray[np.float64]) -> None:
+        """Append a keyframe, seen from the newest one."""
+        newest = self._count - 1
+        self._add(Edge(newest, newest + 1, relative, covariance, "odometry"))
+        if self._count == len(self._poses):
+            self._poses = np.concatenate((self._poses, np.empty_like(self._poses)))
+        self._poses[self._count] = compose(self._poses[newest], relative)
+        self._count += 1
+        self._new_values.insert(self._count - 1, _pose2(self._poses[self._count - 1]))
+
+    def add_edge(self, edge: Edge) -> None:
+        """Add a constraint between two keyframes that exist."""
+        if not 0 <= edge.first < self._count or not 0 <= edge.second < self._count:
+            raise GraphError(f"a constraint names keyframes {edge.first} and {edge.second}, of {self._count}")
+        self._add(edge)
+
+    def update(self) -> None:
+        """Bring the estimate up to date with iSAM2."""
+        self._isam.update(self._new_factors, self._new_values)
+        self._new_factors = gtsam.NonlinearFactorGraph()
+        self._new_values = gtsam.Values()
+        self._take(self._isam.calculateBestEstimate())
+
+    def optimise(self, *, robust: bool = True) -> tuple[float, float, NDArray[np.bool_]]:
+        """Optimise all poses at once (Levenberg-Marquardt; graduated non-convexity if the config asks for it).
+
+        Returns
+        -------
+        (float, float, bool (E,))
+            Nonlinear error before and after, and which of `edges` the solution does not believe.
+        """
+        graph = gtsam.NonlinearFactorGraph()
+        graph.add(_prior(self._start))
+        loss = self._config.robust if robust else "none"
+        for edge in self.edges:
+            graph.add(self._factor(edge, loss == "cauchy"))
+        values = gtsam.Values()
+        for key, pose in enumerate(self.poses):
+            values.insert(key, _pose2(pose))
+        before = graph.error(values)
+        solution = self._solve(graph, values, loss)
+        self._take(solution)
+        return before, graph.error(solution), self._disbelieved()
+
+    def _solve(self, graph: Any, values: Any, loss: str) -> Any:
+        lm = gtsam.LevenbergMarquardtParams()
+        if loss != "gnc":
+            return gtsam.LevenbergMarquardtOptimizer(graph, values, lm).optimize()
+        params = gtsam.GncLMParams(lm)
+        trusted = [0, *(1 + i for i, edge in enumerate(self.edges) if edge.kind == "odometry")]
+        params.setKnownInliers(trusted)
+        optimiser = gtsam.GncLMOptimizer(graph, values, params)
+        optimiser.setInlierCostThresholds(0.5 * 11.34)  # chi-square, 3 degrees of freedom, 99 %
+        return optimiser.optimize()
+
+    def _disbelieved(self) -> NDArray[np.bool_]:
+        from hsslam.se2 import between
+
+        out = np.zeros(len(self.edges), dtype=np.bool_)
+        for i, edge in enumerate(self.edges):
+            if edge.kind == "odometry":
+                continue
+            error = between(edge.relative, between(self._poses[edge.first], self._poses[edge.second]))
+            distance = error @ np.linalg.solve(body_covariance(edge), error)
+            out[i] = distance > 25.0 * self._config.robust_scale**2
+        return out
+
+    def _take(self, values: Any) -> None:
+        poses = np.array([_array(values.atPose2(key)) for key in range(self._count)])
+        if not np.isfinite(poses).all():
+            raise GraphError("the pose graph's solution is not finite; a constraint or its covariance is unusable")
+        self._poses[: self._count] = poses
+
+    def _add(self, edge: Edge) -> None:
+        self.edges.append(edge)
+        self._new_factors.add(self._factor(edge, edge.kind != "odometry" and self._config.robust != "none"))
+
+    def _factor(self, edge: Edge, robust: bool) -> Any:
+        noise = gtsam.noiseModel.Gaussian.Covariance(body_covariance(edge))
+        if robust and edge.kind != "odometry":
+            loss = gtsam.noiseModel.mEstimator.Cauchy.Create(self._config.robust_scale)
+            noise = gtsam.noiseModel.Robust.Create(loss, noise)
+        return gtsam.BetweenFactorPose2(edge.first, edge.second, _pose2(edge.relative), noise)
+
+
+def body_covariance(edge: Edge) -> NDArray[np.float64]:
+    """Covariance (3, 3) of an edge as GTSAM wants it: in the frame of the second pose, with a floor.
+
+    Raises
+    ------
+    GraphError
+        If the edge's pose is not finite, or its covariance not finite and positive definite; GTSAM itself
+        accepts both without a word.
+    """
+    covariance = edge.covariance
+    if not np.isfinite(edge.relative).all():
+        raise GraphError(f"the constraint between keyframes {edge.first} and {edge.second} is not finite")
+    if not np.isfinite(covariance).all() or np.linalg.eigvalsh(covariance)[0] <= 0.0:
+        raise GraphError(
+            f"the covariance of the constraint between keyframes {edge.first} and {edge.second} "
+            "is not positive definite"
+        )
+    c, s = math.cos(edge.relative[2]), math.sin(edge.relative[2])
+    rotation = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    turned: NDArray[np.float64] = rotation @ covariance @ rotation.T
+    turned[0, 0] += FLOOR_STD_XY**2
+    turned[1, 1] += FLOOR_STD_XY**2
+    turned[2, 2] += FLOOR_STD_THETA**2
+    return turned
+
+
+def _prior(start: Pose) -> Any:
+    return gtsam.PriorFactorPose2(0, _pose2(start), gtsam.noiseModel.Isotropic.Sigma(3, PRIOR_STD))
+
+
+def _pose2(pose: Pose) -> Any:
+    return gtsam.Pose2(pose[0], pose[1], pose[2])
+
+
+def _array(pose: Any) -> Pose:
+    return np.array([pose.x(), pose.y(), pose.theta()])

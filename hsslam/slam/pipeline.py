@@ -1,0 +1,200 @@
+"""The whole of SLAM, as a generator of events: what listens to it is no business of its."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from hsslam.config import Config
+from hsslam.errors import DataError
+from hsslam.scan import LaserScan
+from hsslam.se2 import Points, Pose, compose
+from hsslam.slam.events import (
+    Edge,
+    Event,
+    KeyframeAdded,
+    LoopChecked,
+    Optimised,
+    SlamResult,
+    Tracked,
+)
+from hsslam.slam.graph import PoseGraph
+from hsslam.slam.journal import Replay
+from hsslam.slam.loops import LoopCloser
+from hsslam.slam.overlap import match_pairs, overlapping_pairs
+from hsslam.slam.stopwatch import Stopwatch
+from hsslam.slam.tracker import TrackedScan, Tracker
+from hsslam.trajectory import Trajectory
+
+
+class Slam:
+    """Simultaneous localisation and mapping, scan by scan.
+
+    Parameters
+    ----------
+    config : Config
+        Everything that decides what happens.
+    replay : Replay, optional
+        Matches of an interrupted run of the same config on the same log; they are taken, not computed again.
+
+    Raises
+    ------
+    ConfigError, MatcherUnavailableError
+        If a matcher cannot be made.
+    """
+
+    def __init__(self, config: Config, replay: Replay | None = None) -> None:
+        self._config = config
+        self._replay = replay if replay is not None else Replay()
+        self._stopwatch = Stopwatch()
+        self._matcher = config.matcher.create()
+        loop_matcher = config.loop_matcher.create() if config.loop_matcher is not None else self._matcher
+        self._tracker = Tracker(config, self._matcher, self._stopwatch)
+        self._closer = LoopCloser(config, loop_matcher, self._stopwatch)
+        self._graph: PoseGraph | None = None
+        self._keyframes: list[LaserScan] = []
+        self._points: list[Points] = []
+        self._loops: list[LoopChecked] = []
+        self._stamps: list[float] = []
+        self._odometry: list[Pose] = []
+        self._anchors: list[int] = []
+        self._relatives: list[Pose] = []
+        self._online: list[Pose] = []
+        self._matched = 0
+        self._evaluations = 0
+
+    def run(self, scans: Iterable[LaserScan]) -> Iterator[Event]:
+        """Process every scan of a log, then finish."""
+        for scan in scans:
+            yield from self.process(scan)
+        yield from self.finish()
+
+    def process(self, scan: LaserScan) -> Iterator[Event]:
+        """Take the next scan; its pose comes first, then what follows from it."""
+        if self._graph is None:
+            self._graph = PoseGraph(self._config.graph, scan.odometry)
+            self._tracker.add_keyframe(scan, None)
+            first = TrackedScan(np.zeros(3), np.eye(3) * 1e-12, 1.0, True, 0)
+            yield self._record(scan, 0, first)
+            yield self._keep(scan)
+            return
+        tracked = self._tracker.track(scan, self._known(scan.index))
+        newest = len(self._graph) - 1
+        yield self._record(scan, newest, tracked)
+        if not self._tracker.wants_keyframe(tracked):
+            return
+        self._tracker.add_keyframe(scan, tracked)
+        self._graph.add_keyframe(tracked.relative, tracked.covariance)
+        self._anchors[-1], self._relatives[-1] = newest + 1, np.zeros(3)
+        yield self._keep(scan)
+        yield from self._close_loops()
+
+    def finish(self) -> Iterator[Event]:
+        """Optimise everything once more, and match keyframes that overlap again from there.
+
+        Raises
+        ------
+        DataError
+            If there was no scan.
+        """
+        graph = self._require_graph()
+        yield self._optimise("final")
+        for stage in range(self._config.graph.refine_rounds):
+            with self._stopwatch.measure("final"):
+                rules = self._config.graph
+                poses = graph.poses.copy()
+                pairs = overlapping_pairs(poses, rules.overlap_radius, rules.overlap_neighbours)
+                edges = match_pairs(self._config, self._matcher, self._points, poses, pairs, stage)
+                graph.edges = [edge for edge in graph.edges if edge.kind != "overlap"]
+                for edge in edges:
+                    graph.add_edge(edge)
+            yield self._optimise(f"refinement {stage + 1}")
+
+    def result(self) -> SlamResult:
+        """Poses of every scan seen so far, and all that led to them.
+
+        Raises
+        ------
+        DataError
+            If there was no scan.
+        """
+        graph = self._require_graph()
+        stamps = np.array(self._stamps)
+        indices = np.arange(len(stamps), dtype=np.int64)
+        poses = np.array(
+            [compose(graph.poses[k], r) for k, r in zip(self._anchors, self._relatives, strict=True)]
+        )
+        return SlamResult(
+            trajectory=Trajectory(stamps, poses, indices),
+            online=Trajectory(stamps, np.array(self._online), indices),
+            odometry=Trajectory(stamps, np.array(self._odometry), indices),
+            keyframes=self._keyframes,
+            keyframe_poses=graph.poses.copy(),
+            edges=graph.edges,
+            loops=self._loops,
+            matched=self._matched,
+            seconds=dict(self._stopwatch.seconds),
+            statistics={"evaluations": self._evaluations},
+        )
+
+    def _close_loops(self) -> Iterator[Event]:
+        graph = self._require_graph()
+        closed = False
+        for first in self._closer.candidates(graph.poses):
+            second = len(graph) - 1
+            checked = self._replay.loops.get((first, second))
+            if checked is None:
+                checked = self._closer.check(first, self._points, graph.poses)
+            self._loops.append(checked)
+            self._evaluations += checked.evaluations
+            if checked.accepted:
+                graph.add_edge(Edge(first, second, checked.relative, checked.covariance, "loop"))
+                closed = True
+            yield checked
+        if closed:
+            with self._stopwatch.measure("graph"):
+                graph.update()
+
+    def _optimise(self, stage: str) -> Optimised:
+        graph = self._require_graph()
+        with self._stopwatch.measure("final"):
+            before, after, disbelieved = graph.optimise()
+        loops = [edge.kind == "loop" for edge in graph.edges]
+        return Optimised(stage, before, after, int(np.count_nonzero(disbelieved & np.array(loops, dtype=np.bool_))))
+
+    def _known(self, scan: int) -> TrackedScan | None:
+        t = self._replay.tracked.get(scan)
+        return None if t is None else TrackedScan(t.relative, t.covariance, t.score, t.matched, t.evaluations)
+
+    def _record(self, scan: LaserScan, keyframe: int, tracked: TrackedScan) -> Tracked:
+        pose = compose(self._require_graph().poses[keyframe], tracked.relative)
+        self._stamps.append(scan.stamp)
+        self._odometry.append(scan.odometry)
+        self._anchors.append(keyframe)
+        self._relatives.append(tracked.relative)
+        self._online.append(pose)
+        self._matched += tracked.matched
+        self._evaluations += tracked.evaluations
+        return Tracked(
+            scan=scan.index,
+            stamp=scan.stamp,
+            pose=pose,
+            keyframe=keyframe,
+            relative=tracked.relative,
+            covariance=tracked.covariance,
+            score=tracked.score,
+            matched=tracked.matched,
+            evaluations=tracked.evaluations,
+        )
+
+    def _keep(self, scan: LaserScan) -> KeyframeAdded:
+        self._keyframes.append(scan)
+        self._points.append(scan.robot_points)
+        newest = len(self._keyframes) - 1
+        return KeyframeAdded(newest, scan.index, self._require_graph().poses[newest].copy())
+
+    def _require_graph(self) -> PoseGraph:
+        if self._graph is None:
+            raise DataError("the log holds no scans, so there is nothing to map")
+        return self._graph

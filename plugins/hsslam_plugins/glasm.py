@@ -1,0 +1,55 @@
+"""GLASM: genetic scan matching (Lenac, Mumolo, Nolich 2007), the paper's yardstick."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field
+
+from hsslam.matching import Pose, SearchWindow
+from hsslam.search import HitFitness, PopulationConfig, PopulationMatcher, genetic_search
+from hsslam.search.fitness import FitnessName
+
+
+class GlasmConfig(PopulationConfig):
+    """Parameters of GLASM; population, generations, rates, bits and square as its authors published them."""
+
+    fitness: FitnessName = Field(
+        "paper",
+        description="`paper`: squares around the reference's points; `surface`: squares along the segments between them",
+    )
+    half_side: float = Field(0.105, gt=0.0, le=1.0, description="half side of the squares of the fitness (m)")
+    refine: bool = Field(False, description="polish the best pose by point-to-line Gauss-Newton")
+    population_size: int = Field(120, ge=2, description="chromosomes in a generation")
+    generations: int = Field(12, ge=1, description="generations evaluated")
+    bits: int = Field(9, ge=2, le=20, description="bits of the Gray code of each variable")
+    crossover_rate: float = Field(1.0, ge=0.0, le=1.0, description="probability that a child has two parents")
+    mutation_rate: float = Field(0.12, ge=0.0, le=1.0, description="probability that a bit of a child flips")
+    tournament: int = Field(3, ge=1, description="contestants for each parent (the authors give no selection)")
+
+
+class Glasm(PopulationMatcher[GlasmConfig]):
+    """Genetic search over the window, poses as Gray-coded bits."""
+
+    Config = GlasmConfig
+    summary = "genetic search, Gray-coded (Lenac, Mumolo, Nolich 2007)"
+
+    def search(
+        self, fitness: HitFitness, guess: Pose, window: SearchWindow, rng: np.random.Generator
+    ) -> tuple[Pose, int, int]:
+        """See `hsslam.search.genetic_search`."""
+        config = self.config
+        return genetic_search(
+            fitness.cells,
+            fitness.frame,
+            fitness.xs,
+            fitness.ys,
+            guess,
+            window.half,
+            config.population_size,
+            config.generations,
+            config.bits,
+            config.crossover_rate,
+            config.mutation_rate,
+            config.tournament,
+            rng,
+        )

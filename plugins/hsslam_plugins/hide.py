@@ -1,0 +1,54 @@
+"""HIDE: harmony search whose memory differential evolution improves (paper, section 5)."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field
+
+from hsslam.matching import Pose, SearchWindow
+from hsslam.search import HitFitness, PopulationMatcher, hide_search
+from hsslam_plugins.harmony_config import HarmonyConfig, bandwidth
+
+
+class HideConfig(HarmonyConfig):
+    """Parameters of HIDE."""
+
+    evaluations: int = Field(220, ge=1, description="fitness evaluations after the memory is filled (NFE)")
+    harmony_run: int = Field(14, ge=1, description="improvisations between two differential steps (HRT)")
+    attraction: float = Field(0.7, ge=0.0, le=2.0, description="pull towards the best harmony (lambda)")
+    weight: float = Field(0.44, ge=0.0, le=2.0, description="weight of the difference of two harmonies (F)")
+    crossover_rate: float = Field(
+        0.9, ge=0.0, le=1.0, description="share of variables taken from the mutant (the paper gives none)"
+    )
+
+
+class Hide(PopulationMatcher[HideConfig]):
+    """Harmony search and differential evolution in turn over the window."""
+
+    Config = HideConfig
+    summary = "harmony search improved by differential evolution (paper, section 5)"
+
+    def search(
+        self, fitness: HitFitness, guess: Pose, window: SearchWindow, rng: np.random.Generator
+    ) -> tuple[Pose, int, int]:
+        """See `hsslam.search.hide_search`."""
+        config = self.config
+        return hide_search(
+            fitness.cells,
+            fitness.frame,
+            fitness.xs,
+            fitness.ys,
+            guess,
+            window.half,
+            config.memory_size,
+            config.memory_considering_rate,
+            config.pitch_adjusting_rates,
+            bandwidth(config.bandwidth_min),
+            bandwidth(config.bandwidth_max),
+            config.evaluations,
+            config.harmony_run,
+            config.attraction,
+            config.weight,
+            config.crossover_rate,
+            rng,
+        )

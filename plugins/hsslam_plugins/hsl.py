@@ -1,0 +1,44 @@
+"""HSL: localisation by harmony search (paper, section 4)."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field
+
+from hsslam.matching import Pose, SearchWindow
+from hsslam.search import HitFitness, PopulationMatcher, harmony_search
+from hsslam_plugins.harmony_config import HarmonyConfig, bandwidth
+
+
+class HslConfig(HarmonyConfig):
+    """Parameters of HSL."""
+
+    improvisations: int = Field(250, ge=1, description="new harmonies made (NI)")
+
+
+class Hsl(PopulationMatcher[HslConfig]):
+    """Harmony search over the window."""
+
+    Config = HslConfig
+    summary = "harmony search (paper, section 4)"
+
+    def search(
+        self, fitness: HitFitness, guess: Pose, window: SearchWindow, rng: np.random.Generator
+    ) -> tuple[Pose, int, int]:
+        """See `hsslam.search.harmony_search`."""
+        config = self.config
+        return harmony_search(
+            fitness.cells,
+            fitness.frame,
+            fitness.xs,
+            fitness.ys,
+            guess,
+            window.half,
+            config.memory_size,
+            config.memory_considering_rate,
+            config.pitch_adjusting_rates,
+            bandwidth(config.bandwidth_min),
+            bandwidth(config.bandwidth_max),
+            config.improvisations,
+            rng,
+        )
