@@ -47,18 +47,19 @@ def count_hits(
     tx = np.float32((x - frame[0]) * frame[2])
     ty = np.float32((y - frame[1]) * frame[2])
     n = xs.shape[0]
-    index = np.empty(CHUNK, dtype=np.int32)
+    # Unsigned, so that the look-up needs no branch for indices counted from the end.
+    index = np.empty(CHUNK, dtype=np.uint32)
+    stride = np.int32(columns)
     hits = 0
     start = 0
     while start < n:
         stop = min(start + CHUNK, n)
+        px, py = xs[start:stop], ys[start:stop]
         # Two plain loops: the first becomes vector instructions, which the look-up in the second cannot.
         for i in range(stop - start):
-            u = c * xs[start + i] - s * ys[start + i] + tx
-            v = s * xs[start + i] + c * ys[start + i] + ty
-            u = min(max(u, zero), right)
-            v = min(max(v, zero), top)
-            index[i] = np.int32(v) * np.int32(columns) + np.int32(u)
+            u = min(max(c * px[i] - s * py[i] + tx, zero), right)
+            v = min(max(s * px[i] + c * py[i] + ty, zero), top)
+            index[i] = np.int32(v) * stride + np.int32(u)
         for i in range(stop - start):
             hits += flat[index[i]]
         start = stop

@@ -25,7 +25,7 @@ FIT_SPAN = 0.3
 FIT_ROUGHNESS = 0.03
 """Where the returns stray further from the fitted line than this (m, rms) there is a corner: no smoothing."""
 
-REACH = 0.25
+REACH = 0.15
 """The raster knows the nearest segment up to this distance (m)."""
 
 RESOLUTION = 0.05

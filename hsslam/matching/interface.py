@@ -31,7 +31,7 @@ class MatcherConfig(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     score_distance: float = Field(
-        0.10, gt=0.0, le=0.25, description="a point within this distance of the reference surface counts as matched (m)"
+        0.10, gt=0.0, le=0.15, description="a point within this distance of the reference surface counts as matched (m)"
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hsslam.config import GraphSection
 from hsslam.errors import HsslamError
-from hsslam.se2 import Pose, Poses, compose
+from hsslam.se2 import Pose, Poses, between, compose
 from hsslam.slam.events import Edge
 
 PRIOR_STD = 1e-4
@@ -82,7 +82,7 @@ class PoseGraph:
         self._isam.update(self._new_factors, self._new_values)
         self._new_factors = gtsam.NonlinearFactorGraph()
         self._new_values = gtsam.Values()
-        self._take(self._isam.calculateBestEstimate())
+        self._take(self._isam.calculateEstimate())
 
     def optimise(self, *, robust: bool = True) -> tuple[float, float, NDArray[np.bool_]]:
         """Optimise all poses at once (Levenberg-Marquardt; graduated non-convexity if the config asks for it).
@@ -117,8 +117,6 @@ class PoseGraph:
         return optimiser.optimize()
 
     def _disbelieved(self) -> NDArray[np.bool_]:
-        from hsslam.se2 import between
-
         out = np.zeros(len(self.edges), dtype=np.bool_)
         for i, edge in enumerate(self.edges):
             if edge.kind == "odometry":
@@ -129,7 +127,7 @@ class PoseGraph:
         return out
 
     def _take(self, values: Any) -> None:
-        poses = np.array([_array(values.atPose2(key)) for key in range(self._count)])
+        poses = gtsam.utilities.extractPose2(values)  # in the order of their keys
         if not np.isfinite(poses).all():
             raise GraphError("the pose graph's solution is not finite; a constraint or its covariance is unusable")
         self._poses[: self._count] = poses
@@ -178,7 +176,3 @@ def _prior(start: Pose) -> Any:
 
 def _pose2(pose: Pose) -> Any:
     return gtsam.Pose2(pose[0], pose[1], pose[2])
-
-
-def _array(pose: Any) -> Pose:
-    return np.array([pose.x(), pose.y(), pose.theta()])

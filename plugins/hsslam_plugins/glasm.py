@@ -17,7 +17,9 @@ class GlasmConfig(PopulationConfig):
         "paper",
         description="`paper`: squares around the reference's points; `surface`: squares along the segments between them",
     )
-    half_side: float = Field(0.105, gt=0.0, le=1.0, description="half side of the squares of the fitness (m)")
+    half_side: float = Field(
+        0.0525, gt=0.0, le=1.0, description="half side of the squares of the fitness (m): 10.5 cm squares"
+    )
     refine: bool = Field(False, description="polish the best pose by point-to-line Gauss-Newton")
     population_size: int = Field(120, ge=2, description="chromosomes in a generation")
     generations: int = Field(12, ge=1, description="generations evaluated")
