@@ -117,12 +117,16 @@ class GraphSection(Section):
     odometry_std_theta_deg: float = Field(
         5.0, gt=0.0, description="its standard deviation of heading per radian turned or metre driven (deg)"
     )
-    refine_rounds: int = Field(1, ge=0, description="rounds of matching overlapping keyframes again at the end")
+    refine_rounds: int = Field(
+        1, ge=0, description="rounds of matching overlapping keyframes again at the end"
+    )
     overlap_radius: float = Field(3.0, gt=0.0, description="keyframes within this distance may overlap (m)")
     overlap_neighbours: int = Field(8, ge=1, description="overlapping keyframes matched with each, at most")
     overlap_half_xy: float = Field(0.15, gt=0.0, description="half side of the window of such a match (m)")
     overlap_half_theta_deg: float = Field(5.0, gt=0.0, description="half its extent in heading (deg)")
-    overlap_min_score: float = Field(0.5, ge=0.0, le=1.0, description="share of points such a match must explain")
+    overlap_min_score: float = Field(
+        0.5, ge=0.0, le=1.0, description="share of points such a match must explain"
+    )
 
 
 class MapSection(Section):
@@ -139,7 +143,9 @@ class Config(Section):
     matcher: MatcherSection = Field(
         default_factory=lambda: MatcherSection(name="hide"), description="tracks every scan"
     )
-    loop_matcher: MatcherSection | None = Field(None, description="closes loops; the tracker's where left out")
+    loop_matcher: MatcherSection | None = Field(
+        None, description="closes loops; the tracker's where left out"
+    )
     tracker: TrackerSection = TrackerSection()
     keyframes: KeyframeSection = KeyframeSection()
     loops: LoopSection = LoopSection()
@@ -255,7 +261,11 @@ def merge(under: dict[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
         below = out.get(key)
         if key in _MATCHERS:
             below, value = _by_name(below), _by_name(value)
-        if isinstance(below, dict) and isinstance(value, dict) and value.get("name") in (None, below.get("name")):
+        if (
+            isinstance(below, dict)
+            and isinstance(value, dict)
+            and value.get("name") in (None, below.get("name"))
+        ):
             out[key] = merge(below, value)
         else:
             out[key] = value

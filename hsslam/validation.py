@@ -44,7 +44,9 @@ def unknown_key(where: str, key: str, known: list[str]) -> str:
 
 def _model_at(model: type[BaseModel], path: tuple[int | str, ...]) -> type[BaseModel]:
     for part in path:
-        annotation: Any = model.model_fields[str(part)].annotation if str(part) in model.model_fields else None
+        annotation: Any = (
+            model.model_fields[str(part)].annotation if str(part) in model.model_fields else None
+        )
         candidates = [annotation, *get_args(annotation)]
         inner = [c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)]
         if not inner:

@@ -1,1 +1,1 @@
-"""Numba kernels on plain arrays: surfaces and rasters of a reference, fitness of a pose, covariance of a match."""
+"""Numba kernels on plain arrays: surface and raster of a reference, fitness and covariance of a pose."""

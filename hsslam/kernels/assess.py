@@ -1,4 +1,4 @@
-"""How well a scan lies on a reference's surface at a pose: score and covariance, the same for every matcher."""
+"""How well a scan lies on a reference's surface at a pose: the same yardstick for every matcher."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from hsslam.se2 import Points, Pose
 RANGE_STD = 0.01
 """Standard deviation (m) of a return across the surface, at least: the noise of indoor scanners."""
 
-CORRELATION = 6.0
-"""Returns that share an error (a bent wall, a bad line fit, a moved chair) counted as one independent return."""
+CORRELATION = 3.3
+"""Returns that share an error (a bent wall, a bad line fit) and so count as one independent return."""
 
 
 def assess(
@@ -47,9 +47,29 @@ def assess(
     matched, information = gather(
         surface.segments, surface.lines, surface.nearest, surface.frame, points, pose, distance
     )
-    information += np.diag(3.0 / np.maximum(half, 1e-3) ** 2)
-    covariance = np.linalg.inv(information)
-    return matched / max(len(points), 1), 0.5 * (covariance + covariance.T)
+    return matched / max(len(points), 1), covariance_of(information, half)
+
+
+@kernel
+def covariance_of(information: NDArray[np.float64], half: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Covariance (3, 3) from the points' information and the window's, which keeps it positive definite.
+
+    A truth uniform in a box of half side ``h`` has the variance ``h^2 / 3``.
+    """
+    a = information[0, 0] + 3.0 / max(half[0], 1e-3) ** 2
+    b, c = information[0, 1], information[0, 2]
+    d = information[1, 1] + 3.0 / max(half[1], 1e-3) ** 2
+    e = information[1, 2]
+    f = information[2, 2] + 3.0 / max(half[2], 1e-3) ** 2
+    out = np.empty((3, 3))
+    out[0, 0] = d * f - e * e
+    out[0, 1] = out[1, 0] = c * e - b * f
+    out[0, 2] = out[2, 0] = b * e - c * d
+    out[1, 1] = a * f - c * c
+    out[1, 2] = out[2, 1] = b * c - a * e
+    out[2, 2] = a * d - b * b
+    out /= a * out[0, 0] + b * out[0, 1] + c * out[0, 2]
+    return out
 
 
 @kernel

@@ -1,6 +1,6 @@
 """Rasters that a scan's points are looked up in: 1 where a point counts as a hit, 0 elsewhere.
 
-Every raster has a border of zeros one cell wide, so that a look-up clamped to the raster needs no other check.
+Every raster has a border of zeros one cell wide, so that a look-up clamped to it needs no other check.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Raster:
 
     @classmethod
     def build(cls, segments: NDArray[np.float64], half_side: float, resolution: float) -> Raster:
-        """Squares of half side ``half_side`` (m) along (S, 4) segments; a point is a segment of equal ends."""
+        """Squares of half side ``half_side`` (m) along (S, 4) segments; equal ends make a point."""
         if len(segments) == 0:
             return cls(np.zeros((3, 3), dtype=np.uint8), np.array([0.0, 0.0, 1.0]))
         ends = segments.reshape(-1, 2)

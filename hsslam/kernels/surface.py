@@ -43,7 +43,7 @@ class Surface:
     segments : float64 (S, 4)
         Ends ``ax, ay, bx, by`` (m); equal ends for a lone return.
     lines : float64 (S, 4)
-        A point of the fitted line and its unit normal, ``mx, my, nx, ny``; the normal of a lone return is zero.
+        A point of the fitted line and its unit normal, ``mx, my, nx, ny``; a lone return's normal is zero.
     nearest : int32 (H, W)
         Number of the segment nearest to each cell's centre, -1 where none is within `REACH`.
     frame : float64 (3,)
@@ -59,7 +59,12 @@ class Surface:
     def build(cls, points: Points) -> Surface:
         """Make the surface of (N, 2) finite points in beam order; scans may follow one another."""
         if len(points) == 0:
-            return cls(np.empty((0, 4)), np.empty((0, 4)), np.full((1, 1), -1, dtype=np.int32), np.array([0.0, 0.0, 1.0]))
+            return cls(
+                np.empty((0, 4)),
+                np.empty((0, 4)),
+                np.full((1, 1), -1, dtype=np.int32),
+                np.array([0.0, 0.0, 1.0]),
+            )
         segments, lines = join(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
         low = points.min(axis=0) - REACH
         extent = points.max(axis=0) + REACH - low
@@ -104,7 +109,7 @@ def join(
 def fit_line(
     points: Points, i: int, gap: float, span: float, roughness: float, out: NDArray[np.float64]
 ) -> None:
-    """Fit a line to the points around segment ``i``, ``i + 1``; into ``out`` (4,): a point and the unit normal.
+    """Fit a line to the points around segment ``i``, ``i + 1``; into ``out`` (4,): point, normal.
 
     The stretch grows by a point at each end in turn while it stays connected and within half of ``span`` of
     the segment's middle; with too rough a fit the segment itself is the line.
@@ -167,7 +172,8 @@ def squared_distance(segment: NDArray[np.float64], x: float, y: float) -> float:
     if length > 0.0:
         t = min(max((px * dx + py * dy) / length, 0.0), 1.0)
     ex, ey = px - t * dx, py - t * dy
-    return ex * ex + ey * ey
+    squared: float = ex * ex + ey * ey
+    return squared
 
 
 @kernel
@@ -208,4 +214,5 @@ def nearest_segment(nearest: NDArray[np.int32], frame: NDArray[np.float64], x: f
     v = (y - frame[1]) * frame[2]
     if u < 0.0 or v < 0.0 or u >= nearest.shape[1] or v >= nearest.shape[0]:
         return -1
-    return nearest[int(v), int(u)]
+    found: int = nearest[int(v), int(u)]
+    return found

@@ -31,7 +31,10 @@ class MatcherConfig(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     score_distance: float = Field(
-        0.10, gt=0.0, le=0.15, description="a point within this distance of the reference surface counts as matched (m)"
+        0.10,
+        gt=0.0,
+        le=0.15,
+        description="a point within this distance of the reference surface counts as matched (m)",
     )
 
 
@@ -170,7 +173,7 @@ class Matcher(ABC, Generic[ConfigT]):
         self.config: ConfigT = config if config is not None else self.Config()  # type: ignore[assignment]
 
     @classmethod
-    def check_available(cls) -> None:  # noqa: B027  (most plugins need nothing and override nothing)
+    def check_available(cls) -> None:
         """Raise `MatcherUnavailableError` where a dependency is missing or broken."""
 
     def prepare(self, points: Points) -> Reference:

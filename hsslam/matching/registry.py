@@ -83,7 +83,9 @@ def load(name: str) -> type[Matcher[Any]]:
     try:
         loaded = declared.load()
     except Exception as error:
-        raise MatcherUnavailableError(name, f"{type(error).__name__}: {error}", _reinstall(declared)) from error
+        raise MatcherUnavailableError(
+            name, f"{type(error).__name__}: {error}", _reinstall(declared)
+        ) from error
     if not (isinstance(loaded, type) and issubclass(loaded, Matcher)):
         raise MatcherUnavailableError(
             name, f"{declared.value} is not a subclass of hsslam.matching.Matcher", _reinstall(declared)

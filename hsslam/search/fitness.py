@@ -40,7 +40,9 @@ class HitFitness:
         return cls(raster.cells, raster.frame, scaled[0], scaled[1])
 
 
-def build_raster(name: FitnessName, points: Points, surface: Surface, half_side: float, resolution: float) -> Raster:
+def build_raster(
+    name: FitnessName, points: Points, surface: Surface, half_side: float, resolution: float
+) -> Raster:
     """Rasterise a reference for a fitness function.
 
     Parameters

@@ -25,7 +25,7 @@ def decode(gray: int, bits: int, centre: float, half: float) -> float:
 def encode(value: float, bits: int, centre: float, half: float) -> int:
     """Gray code nearest to a value within ``centre`` -+ ``half``."""
     share = (value - centre) / half if half > 0.0 else 0.0
-    code = int(round(0.5 * (share + 1.0) * ((1 << bits) - 1)))
+    code = round(0.5 * (share + 1.0) * ((1 << bits) - 1))
     code = min(max(code, 0), (1 << bits) - 1)
     return code ^ (code >> 1)
 
@@ -77,7 +77,9 @@ def genetic_search(
     best_hits = -1
     for i in range(population_size):
         for d in range(3):
-            genes[i, d] = encode(guess[d], bits, guess[d], half[d]) if i == 0 else int(rng.random() * (1 << bits))
+            genes[i, d] = (
+                encode(guess[d], bits, guess[d], half[d]) if i == 0 else int(rng.random() * (1 << bits))
+            )
     for generation in range(generations):
         for i in range(population_size):
             x = decode(genes[i, 0], bits, guess[0], half[0])

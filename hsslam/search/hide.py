@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from hsslam.jit import kernel
 from hsslam.kernels.fitness import count_hits
-from hsslam.search.harmony import fill_memory, improvise
 from hsslam.se2 import Pose
+from hsslam.search.harmony import fill_memory, improvise
 
 
 @kernel
@@ -106,10 +106,14 @@ bandwidth_min, bandwidth_max, rng
         for _ in range(min(harmony_run, budget - spent)):
             share = spent / budget
             for d in range(3):
-                bandwidth[d] = bandwidth_max[d] * math.exp(math.log(bandwidth_min[d] / bandwidth_max[d]) * share)
+                bandwidth[d] = bandwidth_max[d] * math.exp(
+                    math.log(bandwidth_min[d] / bandwidth_max[d]) * share
+                )
             rate = par_min + (par_max - par_min) * share
             improvise(memory, guess, half, memory_considering_rate, rate, bandwidth, rng, candidate)
-            found = count_hits(cells, frame, xs, ys, candidate[0], candidate[1], candidate[2], hits[worst] + 1)
+            found = count_hits(
+                cells, frame, xs, ys, candidate[0], candidate[1], candidate[2], hits[worst] + 1
+            )
             spent += 1
             if found > hits[worst]:
                 memory[worst] = candidate
@@ -118,7 +122,9 @@ bandwidth_min, bandwidth_max, rng
         best = int(np.argmax(hits))
         for target in range(min(memory_size, budget - spent)):
             evolve(memory, target, best, guess, half, attraction, weight, crossover_rate, rng, candidate)
-            found = count_hits(cells, frame, xs, ys, candidate[0], candidate[1], candidate[2], hits[target] + 1)
+            found = count_hits(
+                cells, frame, xs, ys, candidate[0], candidate[1], candidate[2], hits[target] + 1
+            )
             spent += 1
             if found > hits[target]:
                 memory[target] = candidate

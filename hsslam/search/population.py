@@ -11,8 +11,8 @@ from pydantic import Field
 from hsslam.kernels.raster import Raster
 from hsslam.kernels.refine import refine
 from hsslam.matching.interface import Estimate, Matcher, MatcherConfig, Reference, SearchWindow, clean
-from hsslam.search.fitness import FitnessName, HitFitness, build_raster
 from hsslam.se2 import Points, Pose
+from hsslam.search.fitness import FitnessName, HitFitness, build_raster
 
 FIRST_REACH = 0.15
 LAST_REACH = 0.08
@@ -27,7 +27,7 @@ class PopulationConfig(MatcherConfig):
 
     fitness: FitnessName = Field(
         "surface",
-        description="`paper`: squares around the reference's points; `surface`: squares along the segments between them",
+        description="`paper`: squares around the points; `surface`: squares along the segments between them",
     )
     half_side: float = Field(0.05, gt=0.0, le=1.0, description="half side of the squares of the fitness (m)")
     resolution: float = Field(0.025, gt=0.0, le=0.5, description="side of a raster cell of the fitness (m)")

@@ -47,7 +47,9 @@ class PoseGraph:
         self._poses = np.empty((1024, 3))
         self._poses[0] = start
         self._count = 1
-        self._isam = gtsam.ISAM2(gtsam.ISAM2Params())
+        params = gtsam.ISAM2Params()
+        params.relinearizeSkip = 1  # updates are rare: only loops cause them, and a loop moves a lot
+        self._isam = gtsam.ISAM2(params)
         self._new_factors = gtsam.NonlinearFactorGraph()
         self._new_values = gtsam.Values()
         self._new_values.insert(0, _pose2(start))
@@ -80,6 +82,7 @@ class PoseGraph:
     def update(self) -> None:
         """Bring the estimate up to date with iSAM2."""
         self._isam.update(self._new_factors, self._new_values)
+        self._isam.update()
         self._new_factors = gtsam.NonlinearFactorGraph()
         self._new_values = gtsam.Values()
         self._take(self._isam.calculateEstimate())
@@ -129,7 +132,9 @@ class PoseGraph:
     def _take(self, values: Any) -> None:
         poses = gtsam.utilities.extractPose2(values)  # in the order of their keys
         if not np.isfinite(poses).all():
-            raise GraphError("the pose graph's solution is not finite; a constraint or its covariance is unusable")
+            raise GraphError(
+                "the pose graph's solution is not finite; a constraint or its covariance is unusable"
+            )
         self._poses[: self._count] = poses
 
     def _add(self, edge: Edge) -> None:
@@ -137,7 +142,7 @@ class PoseGraph:
         self._new_factors.add(self._factor(edge, edge.kind != "odometry" and self._config.robust != "none"))
 
     def _factor(self, edge: Edge, robust: bool) -> Any:
-        noise = gtsam.noiseModel.Gaussian.Covariance(body_covariance(edge))
+        noise: Any = gtsam.noiseModel.Gaussian.Covariance(body_covariance(edge))
         if robust and edge.kind != "odometry":
             loss = gtsam.noiseModel.mEstimator.Cauchy.Create(self._config.robust_scale)
             noise = gtsam.noiseModel.Robust.Create(loss, noise)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hsslam.config import Config
 from hsslam.matching.interface import Matcher, MatchResult, Reference
-from hsslam.se2 import Points, Pose, Poses, between
+from hsslam.se2 import Points, Poses, between
 from hsslam.slam.events import LoopChecked
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.stopwatch import Stopwatch
@@ -57,11 +57,19 @@ class LoopCloser:
                 chosen.append(int(i))
         return chosen
 
-    def check(self, first: int, points: list[Points], poses: Poses) -> LoopChecked:
-        """Match the newest keyframe against the submap around keyframe ``first`` and verify the answer."""
+    def check(
+        self, first: int, points: list[Points], poses: Poses, known: LoopChecked | None = None
+    ) -> LoopChecked:
+        """Match the newest keyframe against the submap around keyframe ``first`` and verify the answer.
+
+        ``known``, what an earlier, interrupted run found, is taken as it is. The submap is made all the same:
+        later candidates use it as it was now, in a resumed run as in a whole one.
+        """
         second = len(poses) - 1
         with self._stopwatch.measure("loops"):
             reference = self._reference(first, points, poses)
+            if known is not None:
+                return known
             guess = between(poses[first], poses[second])
             rng = generator(self._config.seed, Purpose.LOOP, first, second)
             result = self._matcher.match(reference, points[second], guess, self._window, rng)
@@ -102,5 +110,3 @@ class LoopCloser:
 
 def _largest_variance(covariance: NDArray[np.float64]) -> float:
     return float(np.linalg.eigvalsh(covariance[:2, :2])[-1])
-
-

@@ -20,12 +20,14 @@ from hsslam.slam.randomness import Purpose, generator
 
 def overlapping_pairs(poses: Poses, radius: float, neighbours: int) -> list[tuple[int, int]]:
     """Pairs ``first < second`` of keyframes within ``radius`` (m): the nearest ``neighbours`` of each, not adjacent."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
-    tree = cKDTree(poses[:, :2])
+    tree = KDTree(poses[:, :2])
     pairs: set[tuple[int, int]] = set()
-    for i, near in enumerate(tree.query_ball_point(poses[:, :2], radius)):
-        others = np.array([j for j in near if j < i - 1], dtype=np.int64)
+    for i in range(len(poses)):
+        others = np.array(
+            [j for j in tree.query_ball_point(poses[i, :2], radius) if j < i - 1], dtype=np.int64
+        )
         if len(others) == 0:
             continue
         offsets = poses[others] - poses[i]
@@ -37,11 +39,18 @@ def overlapping_pairs(poses: Poses, radius: float, neighbours: int) -> list[tupl
 
 
 def match_pairs(
-    config: Config, matcher: Matcher[Any], points: list[Points], poses: Poses, pairs: list[tuple[int, int]], stage: int
+    config: Config,
+    matcher: Matcher[Any],
+    points: list[Points],
+    poses: Poses,
+    pairs: list[tuple[int, int]],
+    stage: int,
 ) -> list[Edge]:
     """Match each pair from its current relative pose; constraints that were found are returned."""
     rules = config.graph
-    window = SearchWindow(rules.overlap_half_xy, rules.overlap_half_xy, math.radians(rules.overlap_half_theta_deg))
+    window = SearchWindow(
+        rules.overlap_half_xy, rules.overlap_half_xy, math.radians(rules.overlap_half_theta_deg)
+    )
     edges: list[Edge] = []
     reference: Reference | None = None
     prepared = -1

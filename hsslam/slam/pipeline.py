@@ -143,9 +143,8 @@ class Slam:
         closed = False
         for first in self._closer.candidates(graph.poses):
             second = len(graph) - 1
-            checked = self._replay.loops.get((first, second))
-            if checked is None:
-                checked = self._closer.check(first, self._points, graph.poses)
+            known = self._replay.loops.get((first, second))
+            checked = self._closer.check(first, self._points, graph.poses, known)
             self._loops.append(checked)
             self._evaluations += checked.evaluations
             if checked.accepted:
@@ -161,7 +160,9 @@ class Slam:
         with self._stopwatch.measure("final"):
             before, after, disbelieved = graph.optimise()
         loops = [edge.kind == "loop" for edge in graph.edges]
-        return Optimised(stage, before, after, int(np.count_nonzero(disbelieved & np.array(loops, dtype=np.bool_))))
+        return Optimised(
+            stage, before, after, int(np.count_nonzero(disbelieved & np.array(loops, dtype=np.bool_)))
+        )
 
     def _known(self, scan: int) -> TrackedScan | None:
         t = self._replay.tracked.get(scan)

@@ -26,4 +26,6 @@ def merge(points: Sequence[Points], poses: Poses, origin: int) -> Points:
     Points
         (sum of N_i, 2) m, keyframe after keyframe, so that beams stay in order.
     """
-    return np.concatenate([transform(between(poses[origin], pose), p) for p, pose in zip(points, poses, strict=True)])
+    return np.concatenate(
+        [transform(between(poses[origin], pose), p) for p, pose in zip(points, poses, strict=True)]
+    )

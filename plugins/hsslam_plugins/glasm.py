@@ -15,7 +15,7 @@ class GlasmConfig(PopulationConfig):
 
     fitness: FitnessName = Field(
         "paper",
-        description="`paper`: squares around the reference's points; `surface`: squares along the segments between them",
+        description="`paper`: squares around the points; `surface`: squares along the segments between them",
     )
     half_side: float = Field(
         0.0525, gt=0.0, le=1.0, description="half side of the squares of the fitness (m): 10.5 cm squares"
@@ -26,7 +26,9 @@ class GlasmConfig(PopulationConfig):
     bits: int = Field(9, ge=2, le=20, description="bits of the Gray code of each variable")
     crossover_rate: float = Field(1.0, ge=0.0, le=1.0, description="probability that a child has two parents")
     mutation_rate: float = Field(0.12, ge=0.0, le=1.0, description="probability that a bit of a child flips")
-    tournament: int = Field(3, ge=1, description="contestants for each parent (the authors give no selection)")
+    tournament: int = Field(
+        3, ge=1, description="contestants for each parent (the authors give no selection)"
+    )
 
 
 class Glasm(PopulationMatcher[GlasmConfig]):

@@ -25,10 +25,14 @@ class HarmonyConfig(PopulationConfig):
         0.98, ge=0.0, le=1.0, description="probability of pitch adjustment at the end (PAR_max)"
     )
     bandwidth_max: float = Field(
-        8.0, gt=0.0, description="largest pitch adjustment at the start (BW_max; cm for x and y, degrees for theta)"
+        8.0,
+        gt=0.0,
+        description="largest pitch adjustment at the start (BW_max; cm for x and y, degrees for theta)",
     )
     bandwidth_min: float = Field(
-        0.2, gt=0.0, description="largest pitch adjustment at the end (BW_min; cm for x and y, degrees for theta)"
+        0.2,
+        gt=0.0,
+        description="largest pitch adjustment at the end (BW_min; cm for x and y, degrees for theta)",
     )
 
     @model_validator(mode="after")

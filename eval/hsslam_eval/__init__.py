@@ -1,0 +1,1 @@
+"""Comparing matchers honestly: trials, metrics, reports."""

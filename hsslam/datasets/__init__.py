@@ -1,0 +1,1 @@
+"""Logs to work on: real ones, simulated ones, files of the user's."""

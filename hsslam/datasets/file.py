@@ -1,0 +1,147 @@
+"""A log in a file, with the truth that lies beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from hsslam.datasets.dataset import DatasetInfo
+from hsslam.errors import DataError
+from hsslam.io.carmen import CarmenStatistics, OnError, read_carmen
+from hsslam.io.carmen_messages import Laser
+from hsslam.io.relations import Relations, read_relations
+from hsslam.io.tum import read_tum
+from hsslam.scan import LaserScan
+from hsslam.trajectory import Trajectory
+
+PACKED = ("", ".bz2", ".gz")
+"""What may follow the suffix of a log."""
+
+LOGS = (".clf", ".log")
+"""Suffixes of a CARMEN log."""
+
+
+class FileDataset:
+    """A CARMEN log and, where they lie beside it, its relations and its exact truth.
+
+    Beside ``office.clf.bz2`` these are ``office.relations`` (with ``office.relations.index.csv``, which names
+    scans by number, where it is there) and ``office.truth.tum`` (a pose per scan). Nothing is kept in memory:
+    each call of `scans` reads the file anew.
+
+    Parameters
+    ----------
+    path : path
+        The log, plain, gzip or bzip2.
+    info : DatasetInfo, optional
+        What listings show; made from the file's name where left out.
+    scans : int, optional
+        Take only the first so many scans, and the truth of those.
+    on_error : {"stop", "skip"}
+        What a malformed line does.
+    laser : {"front", "rear"}
+        Whose scans.
+
+    Raises
+    ------
+    DataError
+        No such file, or ``scans`` below 1.
+    """
+
+    def __init__(
+        self,
+        path: Path | str,
+        *,
+        info: DatasetInfo | None = None,
+        scans: int | None = None,
+        on_error: OnError = "stop",
+        laser: Laser = "front",
+    ) -> None:
+        self.path = Path(path)
+        if not self.path.exists():
+            raise DataError(f"{self.path}: no such file")
+        if self.path.is_dir():
+            raise DataError(f"{self.path}: expected a log, found a folder; name the file in it")
+        if scans is not None and scans < 1:
+            raise DataError(f"{self.path}: expected at least one scan to be asked for, found {scans}")
+        self.statistics = CarmenStatistics()
+        """Of the newest call of `scans`."""
+        self._limit = scans
+        self._on_error: OnError = on_error
+        self._laser: Laser = laser
+        self._count = info.scan_count if info is not None else None
+        if scans is not None and self._count is not None:
+            self._count = min(scans, self._count)
+        self._info = info or DatasetInfo(self.stem, "file", f"CARMEN log {self.path.name}")
+
+    @property
+    def stem(self) -> str:
+        """The file's name without its suffixes."""
+        return log_stem(self.path.name)
+
+    @property
+    def info(self) -> DatasetInfo:
+        """Name, kind, attribution; the scan count once it is known."""
+        i = self._info
+        return DatasetInfo(i.name, i.kind, i.description, i.attribution, self._count)
+
+    def scans(self) -> Iterator[LaserScan]:
+        """Read the scans in the log's order, as a stream; `read_carmen` says what is raised."""
+        self.statistics = statistics = CarmenStatistics()
+        stream = read_carmen(self.path, on_error=self._on_error, laser=self._laser, statistics=statistics)
+        count = 0
+        for scan in islice(stream, self._limit):
+            count += 1
+            yield scan
+        self._count = count
+
+    def truth(self) -> Trajectory | None:
+        """Exact robot poses from ``<stem>.truth.tum``, where it is there.
+
+        Raises
+        ------
+        DataError
+            A malformed line.
+        """
+        path = self.path.with_name(f"{self.stem}.truth.tum")
+        if not path.exists():
+            return None
+        truth = read_tum(path)
+        n = self._limit
+        return Trajectory(truth.stamps[:n], truth.poses[:n], truth.indices[:n])
+
+    def relations(self) -> Relations | None:
+        """Relations from ``<stem>.relations``, where it is there; those between the scans that are taken.
+
+        Without an index file, and where malformed lines are skipped, scans are found by their stamps, which
+        reads the log.
+
+        Raises
+        ------
+        DataError
+            A malformed line, or a stamp that names no scan.
+        """
+        path = self.path.with_name(f"{self.stem}.relations")
+        if not path.exists():
+            return None
+        index = path.with_name(f"{path.name}.index.csv")
+        if index.exists() and self._on_error == "stop":
+            found = read_relations(path, index=index)
+        else:
+            log = read_carmen(self.path, on_error=self._on_error, laser=self._laser)
+            found = read_relations(path, stamps=np.array([scan.stamp for scan in log]))
+        if self._limit is None:
+            return found
+        taken = np.maximum(found.first, found.second) < self._limit
+        return Relations(found.first[taken], found.second[taken], found.poses[taken])
+
+
+def log_stem(name: str) -> str:
+    """Strip a log's file name of ``.clf`` or ``.log``, and of what packs it."""
+    for packed in PACKED[1:]:
+        name = name.removesuffix(packed)
+    for suffix in LOGS:
+        name = name.removesuffix(suffix)
+    return name

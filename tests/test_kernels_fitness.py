@@ -1,0 +1,144 @@
+"""Rasters, hits, assessment and refinement against their NumPy twins."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from hsslam.kernels.assess import assess
+from hsslam.kernels.fitness import count_hits
+from hsslam.kernels.raster import Raster
+from hsslam.kernels.refine import refine, solve3
+from hsslam.kernels.surface import Surface
+from hsslam.se2 import transform
+from hsslam.search import HitFitness
+
+coordinates = st.floats(-4.0, 4.0, allow_nan=False)
+clouds = st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=200).map(
+    lambda rows: np.array(rows, dtype=np.float64)
+)
+poses = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-4.0, 4.0)).map(np.array)
+
+
+def hits_twin(raster: Raster, points: NDArray[np.float64], pose: NDArray[np.float64]) -> int:
+    """Hits by NumPy, in the kernel's single precision."""
+    scaled = (points * raster.frame[2]).astype(np.float32)
+    c, s = np.float32(np.cos(pose[2])), np.float32(np.sin(pose[2]))
+    offset = ((pose[:2] - raster.frame[:2]) * raster.frame[2]).astype(np.float32)
+    u = c * scaled[:, 0] - s * scaled[:, 1] + offset[0]
+    v = s * scaled[:, 0] + c * scaled[:, 1] + offset[1]
+    rows, columns = raster.cells.shape
+    u, v = np.clip(u, 0, columns - 1).astype(int), np.clip(v, 0, rows - 1).astype(int)
+    return int(raster.cells[v, u].sum())
+
+
+def hits(raster: Raster, points: NDArray[np.float64], pose: NDArray[np.float64], at_least: int = 0) -> int:
+    fitness = HitFitness.of(raster, points)
+    return count_hits(
+        fitness.cells, fitness.frame, fitness.xs, fitness.ys, pose[0], pose[1], pose[2], at_least
+    )
+
+
+@given(clouds, clouds, poses)
+@settings(deadline=None, max_examples=40)
+def test_hits_agree_with_numpy(
+    reference: NDArray[np.float64], points: NDArray[np.float64], pose: NDArray[np.float64]
+) -> None:
+    raster = Raster.of_points(reference, 0.05, 0.025)
+    # Fused multiply-add may round a point on a cell's edge to the other side.
+    assert abs(hits(raster, points, pose) - hits_twin(raster, points, pose)) <= 1
+
+
+@given(clouds, clouds, poses, st.integers(0, 200))
+@settings(deadline=None, max_examples=40)
+def test_early_rejection_never_changes_a_count_that_matters(
+    reference: NDArray[np.float64], points: NDArray[np.float64], pose: NDArray[np.float64], at_least: int
+) -> None:
+    raster = Raster.of_points(reference, 0.05, 0.025)
+    whole, rejected = hits(raster, points, pose), hits(raster, points, pose, at_least)
+    assert rejected == whole if whole >= at_least else rejected in (whole, -1)
+
+
+@given(clouds)
+@settings(deadline=None, max_examples=30)
+def test_a_point_hits_its_own_square_and_the_border_is_zero(points: NDArray[np.float64]) -> None:
+    raster = Raster.of_points(points, 0.05, 0.025)
+    assert hits(raster, points, np.zeros(3)) == len(points)
+    assert not raster.cells[[0, -1]].any()
+    assert not raster.cells[:, [0, -1]].any()
+
+
+def test_squares_have_the_size_asked_for() -> None:
+    raster = Raster.of_points(np.zeros((1, 2)), 0.1, 0.01)
+    assert int(raster.cells.sum()) in (20 * 20, 20 * 21, 21 * 21)
+
+
+def test_surface_counts_between_the_points_and_paper_does_not() -> None:
+    reference = np.column_stack((np.arange(0.0, 2.0, 0.4), np.zeros(5)))
+    between = reference[:-1] + [0.2, 0.0]
+    assert hits(Raster.of_points(reference, 0.05, 0.025), between, np.zeros(3)) == 0
+    assert hits(Raster.build(Surface.build(reference).segments, 0.05, 0.025), between, np.zeros(3)) == 4
+
+
+def corner(spacing: float = 0.03) -> NDArray[np.float64]:
+    along = np.arange(0.1, 2.0, spacing)
+    return np.vstack((np.column_stack((along[::-1], 0 * along)), np.column_stack((0 * along, along))))
+
+
+WINDOW = np.array([0.2, 0.2, 0.2])
+
+
+def test_score_is_the_share_of_points_near_the_surface() -> None:
+    points = corner()
+    surface = Surface.build(points)
+    far = points[:30] + [5.0, 5.0]
+    score, _ = assess(surface, np.vstack((points, far)), np.zeros(3), WINDOW, 0.1)
+    assert score == pytest.approx(len(points) / (len(points) + 30))
+
+
+def test_covariance_is_larger_along_a_plain_wall() -> None:
+    wall = np.column_stack((np.arange(-2.0, 2.0, 0.05), np.full(80, 1.5)))
+    _, covariance = assess(Surface.build(wall), wall, np.zeros(3), WINDOW, 0.1)
+    assert np.sqrt(covariance[0, 0]) == pytest.approx(0.2 / np.sqrt(3.0), rel=0.05)
+    assert np.sqrt(covariance[1, 1]) < 0.01
+    assert np.linalg.eigvalsh(covariance)[0] > 0.0
+
+
+def test_covariance_inverts_the_information() -> None:
+    points = corner()
+    _, covariance = assess(Surface.build(points), points, np.zeros(3), WINDOW, 0.1)
+    assert covariance == pytest.approx(covariance.T)
+    assert np.linalg.eigvalsh(covariance)[0] > 0.0
+
+
+@given(st.floats(-0.06, 0.06), st.floats(-0.06, 0.06), st.floats(-0.05, 0.05))
+@settings(deadline=None, max_examples=30)
+def test_refinement_returns_to_the_truth(x: float, y: float, theta: float) -> None:
+    reference = corner()
+    truth = np.array([0.3, 0.2, 0.1])
+    inverse_points = transform(
+        np.array([*(-np.array([[0.995004, 0.099833], [-0.099833, 0.995004]]) @ truth[:2]), -0.1]), reference
+    )
+    s = Surface.build(reference)
+    start = truth + [x, y, theta]
+    found, _, converged = refine(
+        s.segments, s.lines, s.nearest, s.frame, inverse_points, start, 30, 0.15, 0.08, 0.03
+    )
+    assert converged
+    assert found == pytest.approx(truth, abs=2e-3)
+
+
+@given(
+    st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9),
+    st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3),
+)
+@settings(deadline=None, max_examples=40)
+def test_solve3_solves(entries: list[float], right: list[float]) -> None:
+    root = np.array(entries).reshape(3, 3)
+    hessian = root @ root.T + 0.1 * np.eye(3)
+    out = np.empty(3)
+    solve3(hessian, np.array(right), out)
+    assert hessian @ out == pytest.approx(np.array(right), abs=1e-9)
