@@ -25,6 +25,18 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in(cls, data: Any) -> Any:
+        """Keep the rest of a default section that is given in part: two windows have different defaults."""
+        if not isinstance(data, dict):
+            return data
+        out = dict(data)
+        for name, field in cls.model_fields.items():
+            if isinstance(field.default, Section) and isinstance(out.get(name), dict):
+                out[name] = {**field.default.model_dump(), **out[name]}
+        return out
+
 
 class MatcherSection(BaseModel):
     """A matcher by name, with its parameters beside the name; resolved against the matcher's own model."""
@@ -82,6 +94,10 @@ class TrackerSection(Section):
 
     window: WindowSection = WindowSection(half_x=0.2, half_y=0.2, half_theta_deg=10.0)
     min_score: float = Field(0.5, ge=0.0, le=1.0, description="below this score odometry is trusted instead")
+    recovery_score: float = Field(
+        0.75, ge=0.0, le=1.0, description="below this score odometry is doubted and a wide window searched"
+    )
+    recovery_window: WindowSection = WindowSection(half_x=0.75, half_y=0.75, half_theta_deg=60.0)
 
 
 class KeyframeSection(Section):

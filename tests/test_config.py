@@ -79,6 +79,14 @@ def test_set_wins_over_chosen_over_file_over_base(tmp_path: Path) -> None:
     assert load_config(path, base=base, chosen=chosen).keyframes.distance == 0.3
 
 
+def test_a_section_given_in_part_keeps_its_own_defaults(tmp_path: Path) -> None:
+    path = write(tmp_path, "tracker: {window: {half_x: 0.3}}\nloops: {window: {half_x: 0.9}}\n")
+    config, default = load_config(path), Config()
+    assert config.tracker.window == default.tracker.window.model_copy(update={"half_x": 0.3})
+    assert config.loops.window == default.loops.window.model_copy(update={"half_x": 0.9})
+    assert config.tracker.min_score == default.tracker.min_score
+
+
 def test_another_matcher_starts_from_its_own_defaults(tmp_path: Path) -> None:
     path = write(tmp_path, "matcher: {name: hsl, improvisations: 300}\n")
     assert load_config(path, chosen={"matcher": "glasm"}).matcher.name == "glasm"
@@ -175,7 +183,9 @@ def test_several_mistakes_are_told_at_once() -> None:
     st.floats(1e-3, 1e3),
     st.booleans(),
 )
-def test_the_resolved_yaml_reads_back_as_the_same_config(tmp_path_factory, seed, name, loop, distance, on) -> None:
+def test_the_resolved_yaml_reads_back_as_the_same_config(
+    tmp_path_factory, seed, name, loop, distance, on
+) -> None:
     config = load_config(
         base={
             "seed": seed,

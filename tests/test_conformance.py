@@ -6,12 +6,12 @@ import time
 
 import numpy as np
 import pytest
+from hsslam_plugins.hide import Hide, HideConfig
 from pydantic import ConfigDict, Field
 
 from hsslam.errors import MatcherUnavailableError
 from hsslam.matching import Estimate, MatchResult, create
 from hsslam.matching.conformance import check_matcher, conformance_checks, parametrize_with_checks
-from hsslam_plugins.hide import Hide, HideConfig
 
 CHECKS = dict(conformance_checks())
 
@@ -232,7 +232,9 @@ def test_every_check_is_shown_to_fail() -> None:
 @pytest.mark.parametrize(("matcher", "check"), BAD, ids=lambda case: getattr(case, "__name__", case))
 def test_a_bad_matcher_fails_the_right_check(matcher: type[Hide], check: str) -> None:
     others = set(CHECKS) - {check}
-    with pytest.raises(AssertionError, match=rf"{matcher.__name__} fails 1 conformance check\(s\):\n{check}: ."):
+    with pytest.raises(
+        AssertionError, match=rf"{matcher.__name__} fails 1 conformance check\(s\):\n{check}: ."
+    ):
         check_matcher(matcher, exempt=others)
 
 

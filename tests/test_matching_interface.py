@@ -120,7 +120,9 @@ def test_covariance_shrinks_with_more_points(room) -> None:
 
 
 @settings(deadline=None, max_examples=60)
-@given(st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), min_size=3, max_size=40), st.integers(0, 99))
+@given(
+    st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), min_size=3, max_size=40), st.integers(0, 99)
+)
 def test_score_and_covariance_are_sound_for_any_points(rows, seed) -> None:
     points = np.array(rows)
     guess = np.random.default_rng(seed).normal(size=3)

@@ -9,7 +9,17 @@ from pathlib import Path
 import pytest
 
 from hsslam.errors import ConfigError, MatcherUnavailableError
-from hsslam.matching import Estimate, Matcher, MatcherConfig, create, describe, load, names, register, registry
+from hsslam.matching import (
+    Estimate,
+    Matcher,
+    MatcherConfig,
+    create,
+    describe,
+    load,
+    names,
+    register,
+    registry,
+)
 
 BUILT_IN = {"glasm", "hide", "hsl", "icp", "kiss_icp"}
 
@@ -75,10 +85,15 @@ def test_a_third_party_matcher_is_listed_described_and_made_like_a_built_in(site
         ("x = 1\n", "Broken"),
         ("Broken = 3\n", "not a subclass"),
         ("class Broken: pass\n", "not a subclass"),
-        (GOOD.replace("Stay", "Broken") + "    @classmethod\n    def check_available(cls): 1 / 0\n", "ZeroDivision"),
+        (
+            GOOD.replace("Stay", "Broken") + "    @classmethod\n    def check_available(cls): 1 / 0\n",
+            "ZeroDivision",
+        ),
     ],
 )
-def test_a_broken_plugin_is_listed_as_such_and_takes_nothing_down(site: Path, module: str, reason: str) -> None:
+def test_a_broken_plugin_is_listed_as_such_and_takes_nothing_down(
+    site: Path, module: str, reason: str
+) -> None:
     install(site, "broken-package", {"broken": "broken_module:Broken"}, {"broken_module": module})
     assert "broken" in names()
     info = describe("broken")
@@ -92,7 +107,9 @@ def test_a_broken_plugin_is_listed_as_such_and_takes_nothing_down(site: Path, mo
 
 
 def test_making_a_broken_matcher_says_why_and_what_to_type(site: Path) -> None:
-    install(site, "broken-package", {"broken": "broken_module:Broken"}, {"broken_module": "import missing_dep_x"})
+    install(
+        site, "broken-package", {"broken": "broken_module:Broken"}, {"broken_module": "import missing_dep_x"}
+    )
     with pytest.raises(MatcherUnavailableError, match=r"missing_dep_x.*mend it with: pip install"):
         create("broken")
 

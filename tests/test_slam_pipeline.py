@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from hsslam.slam.events import Edge, Event, KeyframeAdded, LoopChecked, Optimise
 from hsslam.slam.graph import GraphError, PoseGraph, body_covariance
 from hsslam.slam.journal import Replay
 from hsslam.slam.pipeline import Slam
+from hsslam.slam.recovery import steps_along
 
 
 @pytest.fixture(scope="module")
@@ -184,3 +187,29 @@ def test_covariance_is_turned_into_the_second_pose_frame() -> None:
     turned = body_covariance(edge)
     assert turned[0, 0] == pytest.approx(1.0, rel=1e-3)
     assert turned[1, 1] < 1e-4
+
+
+def test_tracking_survives_odometry_that_jumps(office: SimulatedDataset) -> None:
+    """As the MIT CSAIL log's does: a step of nearly a metre and half a turn that never happened."""
+    jump = pose(0.8, 0.1, math.radians(50.0))
+
+    def scans() -> Iterator[LaserScan]:
+        for scan in office.scans():
+            if scan.index == 80:
+                return
+            yield scan if scan.index < 40 else replace(scan, odometry=compose(jump, scan.odometry))
+
+    slam = Slam(Config())
+    events = list(slam.run(scans()))
+    truth = office.truth()
+    assert truth is not None
+    assert all(e.matched for e in events if isinstance(e, Tracked))
+    assert errors(slam.result().trajectory.poses, truth.poses[:80]).max() < 0.08
+
+
+def test_tiles_cover_the_wide_window_and_overlap() -> None:
+    for wide, tile in ((0.75, 0.2), (1.0, 0.3), (0.1, 0.2), (math.pi / 3, math.pi / 18)):
+        middles = steps_along(wide, tile)
+        assert middles == pytest.approx(-middles[::-1])
+        assert middles[-1] + tile >= wide
+        assert (np.diff(middles) < 2.0 * tile).all()

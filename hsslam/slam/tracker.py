@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import Config, WindowSection
-from hsslam.matching.interface import Matcher, Reference, SearchWindow
+from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
 from hsslam.scan import LaserScan
 from hsslam.se2 import Points, Pose, Poses, between, compose
 from hsslam.slam.randomness import Purpose, generator
+from hsslam.slam.recovery import match_tiles
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import merge
+
+RECOVERY_GAIN = 0.1
+"""Odometry is overruled only by an answer whose score is this much higher."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +61,7 @@ class Tracker:
         self._reference: Reference | None = None
         self._last_relative: Pose = np.zeros(3)
         self._last_odometry: Pose = np.zeros(3)
+        self._last_motion: Pose = np.zeros(3)
 
     def track(self, scan: LaserScan, known: TrackedScan | None = None) -> TrackedScan:
         """Find a scan's pose seen from the newest keyframe.
@@ -69,6 +74,7 @@ class Tracker:
             What an earlier, interrupted run found for it: taken as it is.
         """
         tracked = known if known is not None else self._match(scan)
+        self._last_motion = between(self._last_relative, tracked.relative)
         self._last_relative, self._last_odometry = tracked.relative, scan.odometry
         return tracked
 
@@ -95,14 +101,33 @@ class Tracker:
             with self._stopwatch.measure("prepare"):
                 poses: Poses = np.array(self._poses)
                 self._reference = self._matcher.prepare(merge(self._points, poses, len(poses) - 1))
+        rules = self._config.tracker
+        rng = generator(self._config.seed, Purpose.TRACK, scan.index)
         with self._stopwatch.measure("track"):
-            rng = generator(self._config.seed, Purpose.TRACK, scan.index)
             result = self._matcher.match(self._reference, scan.robot_points, predicted, self._window, rng)
-        if result.converged and result.score >= self._config.tracker.min_score:
+        if not result.converged or result.score < rules.recovery_score:
+            with self._stopwatch.measure("recover"):
+                result = self._recover(self._reference, scan, result, rng)
+        if result.converged and result.score >= rules.min_score:
             return TrackedScan(result.pose, result.covariance, result.score, True, result.evaluations)
         return TrackedScan(
             predicted, self._odometry_covariance(predicted), result.score, False, result.evaluations
         )
+
+    def _recover(
+        self, reference: Reference, scan: LaserScan, first: MatchResult, rng: np.random.Generator
+    ) -> MatchResult:
+        """Doubt odometry: try the last motion once more as the prediction, then a wide window around it."""
+        rules = self._config.tracker
+        repeated = compose(self._last_relative, self._last_motion)
+        best = self._matcher.match(reference, scan.robot_points, repeated, self._window, rng)
+        evaluations = first.evaluations + best.evaluations
+        if not best.converged or best.score < rules.recovery_score:
+            wide = search_window(rules.recovery_window)
+            best = match_tiles(self._matcher, reference, scan.robot_points, repeated, wide, self._window, rng)
+            evaluations += best.evaluations
+        better = best.converged and (not first.converged or best.score > first.score + RECOVERY_GAIN)
+        return replace(best if better else first, evaluations=evaluations)
 
     def _odometry_covariance(self, relative: Pose) -> NDArray[np.float64]:
         graph = self._config.graph

@@ -1,0 +1,63 @@
+"""A wide window for any matcher: tiles of its usual size, the best answer of all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
+from hsslam.se2 import Points, Pose
+
+OVERLAP = 0.75
+"""Distance of neighbouring tiles as a share of their size: a truth at a tile's edge is well inside the next."""
+
+
+def match_tiles(
+    matcher: Matcher[Any],
+    reference: Reference,
+    points: Points,
+    centre: Pose,
+    wide: SearchWindow,
+    tile: SearchWindow,
+    rng: np.random.Generator,
+) -> MatchResult:
+    """Match from the middle of every tile of a wide window and take the answer of highest score.
+
+    A local method cannot reach far and a population cannot fill a large window; both can look at every part of
+    it in turn.
+
+    Parameters
+    ----------
+    matcher, reference, points, rng
+        As for `hsslam.matching.Matcher.match`.
+    centre : Pose
+        Of the wide window.
+    wide, tile : SearchWindow
+        The whole, and the part searched at a time.
+
+    Returns
+    -------
+    MatchResult
+        The best converged answer (else the best); ``evaluations`` is the sum over all tiles.
+    """
+    best: MatchResult | None = None
+    evaluations = 0
+    steps = (steps_along(w, t) for w, t in zip(wide.half, tile.half, strict=True))
+    for offset in product(*steps):
+        result = matcher.match(reference, points, centre + np.array(offset), tile, rng)
+        evaluations += result.evaluations
+        if best is None or (result.converged, result.score) > (best.converged, best.score):
+            best = result
+    assert best is not None
+    return replace(best, evaluations=evaluations)
+
+
+def steps_along(wide: float, tile: float) -> NDArray[np.float64]:
+    """Middles of the tiles along one axis, symmetric about 0, so that they cover ``wide`` either way."""
+    count = 2 * int(np.ceil(max(wide - tile, 0.0) / (2.0 * tile * OVERLAP))) + 1
+    reach = max(wide - tile, 0.0)
+    return np.linspace(-reach, reach, count)
