@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hsslam.matching import SearchWindow, create
+from hsslam.search import HitFitness
 from hsslam.search.genetic import decode, encode
 from hsslam.search.harmony import improvise
 from hsslam.search.hide import evolve
@@ -133,3 +134,16 @@ def test_differential_step_follows_equation_12() -> None:
         steps = [memory[a] - memory[b] for a in range(6) for b in range(6) if len({a, b, 2}) == 3]
         expected = [np.clip(memory[2] + step, -1.0, 1.0) for step in steps]
         assert min(np.abs(out - e).max() for e in expected) < 1e-12
+
+
+@pytest.mark.parametrize("name", POPULATION)
+def test_trace_never_falls_and_ends_at_the_answer(name: str, room_pair: Pair) -> None:
+    reference, scan, truth = room_pair
+    matcher = create(name)
+    fitness = HitFitness.of(matcher.prepare(reference).raster, scan)
+    _, _, evaluations = matcher.search(fitness, truth, WINDOW, np.random.default_rng(3))
+    trace = np.full((evaluations, 4), np.nan)
+    pose, hits, _ = matcher.search(fitness, truth, WINDOW, np.random.default_rng(3), trace)
+    assert (np.diff(trace[:, 3]) >= 0).all()
+    assert trace[-1, 3] == hits
+    assert (trace[-1, :3] == pose).all()

@@ -4,10 +4,16 @@ from hsslam.search.fitness import FITNESS_NAMES, HitFitness
 from hsslam.search.genetic import genetic_search
 from hsslam.search.harmony import harmony_search
 from hsslam.search.hide import hide_search
-from hsslam.search.population import PopulationConfig, PopulationMatcher, PopulationReference
+from hsslam.search.population import (
+    NO_TRACE,
+    PopulationConfig,
+    PopulationMatcher,
+    PopulationReference,
+)
 
 __all__ = [
     "FITNESS_NAMES",
+    "NO_TRACE",
     "HitFitness",
     "PopulationConfig",
     "PopulationMatcher",

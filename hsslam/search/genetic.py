@@ -45,6 +45,7 @@ def genetic_search(
     mutation_rate: float,
     tournament: int,
     rng: np.random.Generator,
+    trace: NDArray[np.float64],
 ) -> tuple[Pose, int, int]:
     """Search the window for the pose with most hits (GLASM).
 
@@ -54,7 +55,7 @@ def genetic_search(
 
     Parameters
     ----------
-    cells, frame, xs, ys, guess, half, rng
+    cells, frame, xs, ys, guess, half, rng, trace
         As for `hsslam.search.harmony.harmony_search`.
     population_size, generations : int
         Chromosomes, and how often they are evaluated: the budget is their product.
@@ -89,6 +90,11 @@ def genetic_search(
             if hits[i] > best_hits:
                 best_hits = hits[i]
                 best_genes[:] = genes[i]
+            evaluation = generation * population_size + i
+            if evaluation < trace.shape[0]:
+                for d in range(3):
+                    trace[evaluation, d] = decode(best_genes[d], bits, guess[d], half[d])
+                trace[evaluation, 3] = best_hits
         if generation == generations - 1:
             break
         children[0] = best_genes

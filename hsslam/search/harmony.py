@@ -39,6 +39,16 @@ def improvise(
 
 
 @kernel
+def record(
+    trace: NDArray[np.float64], evaluation: int, memory: NDArray[np.float64], hits: NDArray[np.int64]
+) -> None:
+    """Write the best harmony and its hits to a row of the trace."""
+    best = int(np.argmax(hits))
+    trace[evaluation, :3] = memory[best]
+    trace[evaluation, 3] = hits[best]
+
+
+@kernel
 def fill_memory(
     cells: NDArray[np.uint8],
     frame: NDArray[np.float64],
@@ -49,6 +59,7 @@ def fill_memory(
     rng: np.random.Generator,
     memory: NDArray[np.float64],
     hits: NDArray[np.int64],
+    trace: NDArray[np.float64],
 ) -> None:
     """Fill the memory: the guess itself, then harmonies uniform in the window (paper, equations 1, 5 and 6)."""
     for i in range(memory.shape[0]):
@@ -56,6 +67,8 @@ def fill_memory(
             offset = 0.0 if i == 0 else (2.0 * rng.random() - 1.0) * half[d]
             memory[i, d] = guess[d] + offset
         hits[i] = count_hits(cells, frame, xs, ys, memory[i, 0], memory[i, 1], memory[i, 2], 0)
+        if i < trace.shape[0]:
+            record(trace, i, memory, hits[: i + 1])
 
 
 @kernel
@@ -73,6 +86,7 @@ def harmony_search(
     bandwidth_max: NDArray[np.float64],
     improvisations: int,
     rng: np.random.Generator,
+    trace: NDArray[np.float64],
 ) -> tuple[Pose, int, int]:
     """Search the window for the pose with most hits (paper: HSL).
 
@@ -96,6 +110,8 @@ def harmony_search(
         NI.
     rng : numpy.random.Generator
         Source of every random choice.
+    trace : float64 (E, 4)
+        Filled with the best pose and its hits after each of the first E evaluations; E may be 0.
 
     Returns
     -------
@@ -104,7 +120,7 @@ def harmony_search(
     """
     memory = np.empty((memory_size, 3))
     hits = np.empty(memory_size, dtype=np.int64)
-    fill_memory(cells, frame, xs, ys, guess, half, rng, memory, hits)
+    fill_memory(cells, frame, xs, ys, guess, half, rng, memory, hits, trace)
     candidate = np.empty(3)
     bandwidth = np.empty(3)
     worst = int(np.argmin(hits))
@@ -120,5 +136,7 @@ def harmony_search(
             memory[worst] = candidate
             hits[worst] = found
             worst = int(np.argmin(hits))
+        if memory_size + t < trace.shape[0]:
+            record(trace, memory_size + t, memory, hits)
     best = int(np.argmax(hits))
     return memory[best].copy(), hits[best], memory_size + improvisations

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hsslam.jit import kernel
 from hsslam.kernels.fitness import count_hits
 from hsslam.se2 import Pose
-from hsslam.search.harmony import fill_memory, improvise
+from hsslam.search.harmony import fill_memory, improvise, record
 
 
 @kernel
@@ -67,6 +67,7 @@ def hide_search(
     weight: float,
     crossover_rate: float,
     rng: np.random.Generator,
+    trace: NDArray[np.float64],
 ) -> tuple[Pose, int, int]:
     """Search the window for the pose with most hits (paper: HIDE, Fig. 5).
 
@@ -76,7 +77,7 @@ def hide_search(
     Parameters
     ----------
     cells, frame, xs, ys, guess, half, memory_size, memory_considering_rate, pitch_adjusting_rates, \
-bandwidth_min, bandwidth_max, rng
+bandwidth_min, bandwidth_max, rng, trace
         As for `hsslam.search.harmony.harmony_search`.
     budget : int
         NFE: evaluations after the memory was filled.
@@ -96,7 +97,7 @@ bandwidth_min, bandwidth_max, rng
     """
     memory = np.empty((memory_size, 3))
     hits = np.empty(memory_size, dtype=np.int64)
-    fill_memory(cells, frame, xs, ys, guess, half, rng, memory, hits)
+    fill_memory(cells, frame, xs, ys, guess, half, rng, memory, hits, trace)
     candidate = np.empty(3)
     bandwidth = np.empty(3)
     par_min, par_max = pitch_adjusting_rates
@@ -119,6 +120,8 @@ bandwidth_min, bandwidth_max, rng
                 memory[worst] = candidate
                 hits[worst] = found
                 worst = int(np.argmin(hits))
+            if memory_size + spent - 1 < trace.shape[0]:
+                record(trace, memory_size + spent - 1, memory, hits)
         best = int(np.argmax(hits))
         for target in range(min(memory_size, budget - spent)):
             evolve(memory, target, best, guess, half, attraction, weight, crossover_rate, rng, candidate)
@@ -131,5 +134,7 @@ bandwidth_min, bandwidth_max, rng
                 hits[target] = found
                 if found > hits[best]:
                     best = target
+            if memory_size + spent - 1 < trace.shape[0]:
+                record(trace, memory_size + spent - 1, memory, hits)
     best = int(np.argmax(hits))
     return memory[best].copy(), hits[best], memory_size + spent

@@ -6,6 +6,7 @@ from abc import abstractmethod
 from typing import Any, Generic, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from hsslam.kernels.raster import Raster
@@ -20,6 +21,10 @@ LAST_REACH = 0.08
 
 CAUCHY_SCALE = 0.03
 """Scale of the refinement's robust weight (m)."""
+
+
+NO_TRACE: NDArray[np.float64] = np.empty((0, 4))
+"""Nothing is traced."""
 
 
 class PopulationConfig(MatcherConfig):
@@ -60,9 +65,18 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
 
     @abstractmethod
     def search(
-        self, fitness: HitFitness, guess: Pose, window: SearchWindow, rng: np.random.Generator
+        self,
+        fitness: HitFitness,
+        guess: Pose,
+        window: SearchWindow,
+        rng: np.random.Generator,
+        trace: NDArray[np.float64] = NO_TRACE,
     ) -> tuple[Pose, int, int]:
-        """Find the pose with most hits: the pose, its hits, evaluations spent."""
+        """Find the pose with most hits: the pose, its hits, evaluations spent.
+
+        ``trace``, float64 (E, 4), is filled with the best pose and its hits after each of the first E
+        evaluations: what convergence plots are made from.
+        """
 
     def estimate(
         self,

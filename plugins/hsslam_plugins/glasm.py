@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from hsslam.matching import Pose, SearchWindow
-from hsslam.search import HitFitness, PopulationConfig, PopulationMatcher, genetic_search
+from hsslam.search import NO_TRACE, HitFitness, PopulationConfig, PopulationMatcher, genetic_search
 from hsslam.search.fitness import FitnessName
 
 
@@ -38,7 +39,12 @@ class Glasm(PopulationMatcher[GlasmConfig]):
     summary = "genetic search, Gray-coded (Lenac, Mumolo, Nolich 2007)"
 
     def search(
-        self, fitness: HitFitness, guess: Pose, window: SearchWindow, rng: np.random.Generator
+        self,
+        fitness: HitFitness,
+        guess: Pose,
+        window: SearchWindow,
+        rng: np.random.Generator,
+        trace: NDArray[np.float64] = NO_TRACE,
     ) -> tuple[Pose, int, int]:
         """See `hsslam.search.genetic_search`."""
         config = self.config
@@ -56,4 +62,5 @@ class Glasm(PopulationMatcher[GlasmConfig]):
             config.mutation_rate,
             config.tournament,
             rng,
+            trace,
         )

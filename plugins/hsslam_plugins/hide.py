@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from hsslam.matching import Pose, SearchWindow
-from hsslam.search import HitFitness, PopulationMatcher, hide_search
+from hsslam.search import NO_TRACE, HitFitness, PopulationMatcher, hide_search
 from hsslam_plugins.harmony_config import HarmonyConfig, bandwidth
 
 
@@ -29,7 +30,12 @@ class Hide(PopulationMatcher[HideConfig]):
     summary = "harmony search improved by differential evolution (paper, section 5)"
 
     def search(
-        self, fitness: HitFitness, guess: Pose, window: SearchWindow, rng: np.random.Generator
+        self,
+        fitness: HitFitness,
+        guess: Pose,
+        window: SearchWindow,
+        rng: np.random.Generator,
+        trace: NDArray[np.float64] = NO_TRACE,
     ) -> tuple[Pose, int, int]:
         """See `hsslam.search.hide_search`."""
         config = self.config
@@ -51,4 +57,5 @@ class Hide(PopulationMatcher[HideConfig]):
             config.weight,
             config.crossover_rate,
             rng,
+            trace,
         )

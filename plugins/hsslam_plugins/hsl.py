@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from hsslam.matching import Pose, SearchWindow
-from hsslam.search import HitFitness, PopulationMatcher, harmony_search
+from hsslam.search import NO_TRACE, HitFitness, PopulationMatcher, harmony_search
 from hsslam_plugins.harmony_config import HarmonyConfig, bandwidth
 
 
@@ -23,7 +24,12 @@ class Hsl(PopulationMatcher[HslConfig]):
     summary = "harmony search (paper, section 4)"
 
     def search(
-        self, fitness: HitFitness, guess: Pose, window: SearchWindow, rng: np.random.Generator
+        self,
+        fitness: HitFitness,
+        guess: Pose,
+        window: SearchWindow,
+        rng: np.random.Generator,
+        trace: NDArray[np.float64] = NO_TRACE,
     ) -> tuple[Pose, int, int]:
         """See `hsslam.search.harmony_search`."""
         config = self.config
@@ -41,4 +47,5 @@ class Hsl(PopulationMatcher[HslConfig]):
             bandwidth(config.bandwidth_max),
             config.improvisations,
             rng,
+            trace,
         )
