@@ -15,7 +15,9 @@ from hsslam.errors import ConfigError, DataError
 from hsslam.slam.events import Event, KeyframeAdded, LoopChecked, Optimised, Tracked
 from hsslam.slam.journal import Header, Journal, Replay, read_journal
 
-HEADER = Header({"source": "office", "scans": None}, {"seed": 0, "matcher": {"name": "hide", "memory_size": 30}})
+HEADER = Header(
+    {"source": "office", "scans": None}, {"seed": 0, "matcher": {"name": "hide", "memory_size": 30}}
+)
 
 floats = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -53,7 +55,14 @@ def write(path: Path, *events: Event, header: Header = HEADER, replay: Replay | 
 
 def test_events_come_back(tmp_path: Path) -> None:
     path = tmp_path / "j.jsonl"
-    write(path, tracked(0), KeyframeAdded(0, 0, np.zeros(3)), tracked(1), loop(0, 1), Optimised("final", 2.0, 1.0, 1))
+    write(
+        path,
+        tracked(0),
+        KeyframeAdded(0, 0, np.zeros(3)),
+        tracked(1),
+        loop(0, 1),
+        Optimised("final", 2.0, 1.0, 1),
+    )
     replay = read_journal(path)
     assert set(replay.tracked) == {0, 1}
     assert same(replay.tracked[1], tracked(1))
@@ -132,12 +141,18 @@ def test_a_journal_is_not_overwritten(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("header", "named"),
     [
-        (Header(HEADER.dataset, {"seed": 1, "matcher": HEADER.config["matcher"]}), r"config\.seed was 0, now 1"),
+        (
+            Header(HEADER.dataset, {"seed": 1, "matcher": HEADER.config["matcher"]}),
+            r"config\.seed was 0, now 1",
+        ),
         (
             Header(HEADER.dataset, {"seed": 0, "matcher": {"name": "hide", "memory_size": 31}}),
             r"config\.matcher\.memory_size was 30, now 31",
         ),
-        (Header({"source": "hall", "scans": None}, HEADER.config), r"dataset\.source was 'office', now 'hall'"),
+        (
+            Header({"source": "hall", "scans": None}, HEADER.config),
+            r"dataset\.source was 'office', now 'hall'",
+        ),
         (Header(HEADER.dataset, HEADER.config, "99.0"), r"version was .*, now '99\.0'"),
     ],
 )

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from hsslam.jit import kernel
 from hsslam.se2 import Points
 
-GAP = 0.5
+GAP = 0.35
 """Neighbouring returns further apart than this (m) are not joined."""
 
-FIT_SPAN = 0.3
+FIT_SPAN = 0.2
 """A line is fitted to the returns within this stretch of surface around a segment (m)."""
 
 FIT_ROUGHNESS = 0.03

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from functools import cached_property
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -41,12 +42,22 @@ class PopulationConfig(MatcherConfig):
 
 
 class PopulationReference(Reference):
-    """A reference with the raster that the search looks points up in."""
+    """A reference with the rasters that the search looks points up in."""
 
     def __init__(self, points: Points, config: PopulationConfig) -> None:
         super().__init__(points)
-        self.raster: Raster = build_raster(
-            config.fitness, points, self.surface, config.half_side, config.resolution
+        self._config = config
+        self.raster: Raster = self._build(1.0)
+
+    @cached_property
+    def coarse(self) -> Raster:
+        """Squares and cells twice as large: what a search over a wide window can see from afar."""
+        return self._build(2.0)
+
+    def _build(self, scale: float) -> Raster:
+        config = self._config
+        return build_raster(
+            config.fitness, self.points, self.surface, scale * config.half_side, scale * config.resolution
         )
 
 
@@ -62,6 +73,10 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
     def prepare(self, points: Points) -> PopulationReference:
         """Rasterise a reference; see `hsslam.matching.Matcher.prepare`."""
         return PopulationReference(clean(points), self.config)
+
+    def is_wide(self, window: SearchWindow) -> bool:
+        """Whether to search a window on the coarse raster."""
+        return False
 
     @abstractmethod
     def search(
@@ -88,7 +103,8 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
     ) -> Estimate:
         """Search, then refine; a refinement that leaves the window is discarded."""
         assert isinstance(reference, PopulationReference)
-        fitness = HitFitness.of(reference.raster, points)
+        raster = reference.coarse if self.is_wide(window) else reference.raster
+        fitness = HitFitness.of(raster, points)
         found, hits, evaluations = self.search(fitness, guess, window, rng)
         diagnostics: dict[str, Any] = {"fitness": hits / len(points)}
         if not self.config.refine:

@@ -208,7 +208,9 @@ def _header(values: Mapping[str, Any]) -> Header:
 
 def _event(values: dict[str, Any]) -> Event:
     kind = _EVENTS[values.pop("event")]
-    arrays = {key: np.array(value, dtype=np.float64) for key, value in values.items() if isinstance(value, list)}
+    arrays = {
+        key: np.array(value, dtype=np.float64) for key, value in values.items() if isinstance(value, list)
+    }
     return kind(**{**values, **arrays})
 
 

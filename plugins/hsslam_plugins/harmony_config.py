@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from hsslam.matching import SearchWindow
 from hsslam.search import PopulationConfig
 
 
@@ -35,6 +37,11 @@ class HarmonyConfig(PopulationConfig):
         description="largest pitch adjustment at the end (BW_min; cm for x and y, degrees for theta)",
     )
 
+    wide_windows: bool = Field(
+        True,
+        description="in windows far larger than the paper's: a larger memory, budget and bandwidth, a coarser raster",
+    )
+
     @model_validator(mode="after")
     def _ordered(self) -> HarmonyConfig:
         if self.bandwidth_min > self.bandwidth_max:
@@ -45,6 +52,47 @@ class HarmonyConfig(PopulationConfig):
     def pitch_adjusting_rates(self) -> tuple[float, float]:
         """PAR_min, PAR_max."""
         return self.pitch_adjusting_rate_min, self.pitch_adjusting_rate_max
+
+
+PAPER_WINDOW = SearchWindow(0.15, 0.15, math.radians(10.0))
+"""The window that the published parameters were tuned for (paper, section 6)."""
+
+WIDE_FROM = 1.5
+"""Parameters change for windows this many times as large along each axis, on geometric average."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Parameters of one search, the window taken into account.
+
+    Parameters
+    ----------
+    wide : bool
+        Whether the window is far larger than the paper's.
+    memory_size : int
+        HMS: grows with the window's size along an axis.
+    budget : int
+        Evaluations after the memory is filled: grow with its square.
+    bandwidth_min, bandwidth_max : float64 (3,)
+        m, m, rad; the larger one grows with its root.
+    """
+
+    wide: bool
+    memory_size: int
+    budget: int
+    bandwidth_min: NDArray[np.float64]
+    bandwidth_max: NDArray[np.float64]
+
+
+def effort(config: HarmonyConfig, budget: int, window: SearchWindow) -> Effort:
+    """Parameters for a window; as configured unless it is wide (and ``wide_windows`` is on)."""
+    low, high = bandwidth(config.bandwidth_min), bandwidth(config.bandwidth_max)
+    growth = float(np.prod(window.half / PAPER_WINDOW.half)) ** (1.0 / 3.0)
+    if not config.wide_windows or growth < WIDE_FROM:
+        return Effort(False, config.memory_size, budget, low, high)
+    return Effort(
+        True, round(config.memory_size * growth), round(budget * growth**2), low, high * math.sqrt(growth)
+    )
 
 
 def bandwidth(value: float) -> NDArray[np.float64]:

@@ -8,7 +8,11 @@ from pydantic import Field
 
 from hsslam.matching import Pose, SearchWindow
 from hsslam.search import NO_TRACE, HitFitness, PopulationMatcher, hide_search
-from hsslam_plugins.harmony_config import HarmonyConfig, bandwidth
+from hsslam_plugins.harmony_config import HarmonyConfig, effort
+
+
+WIDE_WEIGHT = 0.8
+"""F in wide windows: the published 0.44 gathers the memory in one basin before it has seen the others."""
 
 
 class HideConfig(HarmonyConfig):
@@ -29,6 +33,10 @@ class Hide(PopulationMatcher[HideConfig]):
     Config = HideConfig
     summary = "harmony search improved by differential evolution (paper, section 5)"
 
+    def is_wide(self, window: SearchWindow) -> bool:
+        """See `hsslam_plugins.harmony_config.Effort`."""
+        return effort(self.config, self.config.evaluations, window).wide
+
     def search(
         self,
         fitness: HitFitness,
@@ -39,6 +47,7 @@ class Hide(PopulationMatcher[HideConfig]):
     ) -> tuple[Pose, int, int]:
         """See `hsslam.search.hide_search`."""
         config = self.config
+        scaled = effort(config, config.evaluations, window)
         return hide_search(
             fitness.cells,
             fitness.frame,
@@ -46,15 +55,15 @@ class Hide(PopulationMatcher[HideConfig]):
             fitness.ys,
             guess,
             window.half,
-            config.memory_size,
+            scaled.memory_size,
             config.memory_considering_rate,
             config.pitch_adjusting_rates,
-            bandwidth(config.bandwidth_min),
-            bandwidth(config.bandwidth_max),
-            config.evaluations,
+            scaled.bandwidth_min,
+            scaled.bandwidth_max,
+            scaled.budget,
             config.harmony_run,
             config.attraction,
-            config.weight,
+            WIDE_WEIGHT if scaled.wide else config.weight,
             config.crossover_rate,
             rng,
             trace,

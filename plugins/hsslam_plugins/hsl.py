@@ -8,7 +8,7 @@ from pydantic import Field
 
 from hsslam.matching import Pose, SearchWindow
 from hsslam.search import NO_TRACE, HitFitness, PopulationMatcher, harmony_search
-from hsslam_plugins.harmony_config import HarmonyConfig, bandwidth
+from hsslam_plugins.harmony_config import HarmonyConfig, effort
 
 
 class HslConfig(HarmonyConfig):
@@ -23,6 +23,10 @@ class Hsl(PopulationMatcher[HslConfig]):
     Config = HslConfig
     summary = "harmony search (paper, section 4)"
 
+    def is_wide(self, window: SearchWindow) -> bool:
+        """See `hsslam_plugins.harmony_config.Effort`."""
+        return effort(self.config, self.config.improvisations, window).wide
+
     def search(
         self,
         fitness: HitFitness,
@@ -33,6 +37,7 @@ class Hsl(PopulationMatcher[HslConfig]):
     ) -> tuple[Pose, int, int]:
         """See `hsslam.search.harmony_search`."""
         config = self.config
+        scaled = effort(config, config.improvisations, window)
         return harmony_search(
             fitness.cells,
             fitness.frame,
@@ -40,12 +45,12 @@ class Hsl(PopulationMatcher[HslConfig]):
             fitness.ys,
             guess,
             window.half,
-            config.memory_size,
+            scaled.memory_size,
             config.memory_considering_rate,
             config.pitch_adjusting_rates,
-            bandwidth(config.bandwidth_min),
-            bandwidth(config.bandwidth_max),
-            config.improvisations,
+            scaled.bandwidth_min,
+            scaled.bandwidth_max,
+            scaled.budget,
             rng,
             trace,
         )
