@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hsslam.kernels.assess import assess
+from hsslam.kernels.assess import assess, degenerate_direction
 from hsslam.kernels.fitness import count_hits
 from hsslam.kernels.raster import Raster
 from hsslam.kernels.refine import refine, solve3
@@ -77,8 +77,8 @@ def test_squares_have_the_size_asked_for() -> None:
 
 
 def test_surface_counts_between_the_points_and_paper_does_not() -> None:
-    reference = np.column_stack((np.arange(0.0, 2.0, 0.4), np.zeros(5)))
-    between = reference[:-1] + [0.2, 0.0]
+    reference = np.column_stack((np.arange(0.0, 1.5, 0.3), np.zeros(5)))
+    between = reference[:-1] + [0.15, 0.0]
     assert hits(Raster.of_points(reference, 0.05, 0.025), between, np.zeros(3)) == 0
     assert hits(Raster.build(Surface.build(reference).segments, 0.05, 0.025), between, np.zeros(3)) == 4
 
@@ -142,3 +142,14 @@ def test_solve3_solves(entries: list[float], right: list[float]) -> None:
     out = np.empty(3)
     solve3(hessian, np.array(right), out)
     assert hessian @ out == pytest.approx(np.array(right), abs=1e-9)
+
+
+def test_a_plain_wall_leaves_its_own_direction_open_and_a_corner_none() -> None:
+    angle = 0.4
+    along = np.arange(-2.0, 2.0, 0.05)
+    wall = np.column_stack((along * np.cos(angle), along * np.sin(angle))) + [-0.5, 1.5]
+    _, covariance = assess(Surface.build(wall), wall, np.zeros(3), WINDOW, 0.1)
+    assert degenerate_direction(covariance, WINDOW) == pytest.approx(angle, abs=0.02)
+    points = corner()
+    _, covariance = assess(Surface.build(points), points, np.zeros(3), WINDOW, 0.1)
+    assert np.isnan(degenerate_direction(covariance, WINDOW))

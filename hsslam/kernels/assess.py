@@ -14,8 +14,11 @@ from hsslam.se2 import Points, Pose
 RANGE_STD = 0.01
 """Standard deviation (m) of a return across the surface, at least: the noise of indoor scanners."""
 
-CORRELATION = 3.3
+CORRELATION = 2.8
 """Returns that share an error (a bent wall, a bad line fit) and so count as one independent return."""
+
+DEGENERATE_SHARE = 0.1
+"""Share of the window's variance that a direction must keep to count as open."""
 
 
 def assess(
@@ -70,6 +73,22 @@ def covariance_of(information: NDArray[np.float64], half: NDArray[np.float64]) -
     out[2, 2] = a * d - b * b
     out /= a * out[0, 0] + b * out[0, 1] + c * out[0, 2]
     return out
+
+
+@kernel
+def degenerate_direction(covariance: NDArray[np.float64], half: NDArray[np.float64]) -> float:
+    """Direction (rad, in [-pi/2, pi/2)) in which the position is hardly better known than the window; NaN if none.
+
+    It is the long axis of the covariance's ellipse, where the variance along it is over `DEGENERATE_SHARE` of
+    that of a truth uniform in the window.
+    """
+    a, b, d = covariance[0, 0], covariance[0, 1], covariance[1, 1]
+    largest = 0.5 * (a + d) + math.sqrt(0.25 * (a - d) * (a - d) + b * b)
+    prior = max(half[0], half[1]) ** 2 / 3.0
+    if largest < DEGENERATE_SHARE * prior:
+        return math.nan
+    angle = 0.5 * math.atan2(2.0 * b, a - d)
+    return angle if angle < 0.5 * math.pi else -0.5 * math.pi
 
 
 @kernel

@@ -26,23 +26,26 @@ class Raster:
         1 for a hit.
     frame : float64 (3,)
         Position (m) of the corner of cell (0, 0), and cells per metre.
+    half_side : float
+        Of the squares (m).
     """
 
     cells: NDArray[np.uint8]
     frame: NDArray[np.float64]
+    half_side: float
 
     @classmethod
     def build(cls, segments: NDArray[np.float64], half_side: float, resolution: float) -> Raster:
         """Squares of half side ``half_side`` (m) along (S, 4) segments; equal ends make a point."""
         if len(segments) == 0:
-            return cls(np.zeros((3, 3), dtype=np.uint8), np.array([0.0, 0.0, 1.0]))
+            return cls(np.zeros((3, 3), dtype=np.uint8), np.array([0.0, 0.0, 1.0]), half_side)
         ends = segments.reshape(-1, 2)
         extent = ends.max(axis=0) - ends.min(axis=0) + 2.0 * half_side
         resolution = max(resolution, float(extent.max()) / MAXIMUM_CELLS_PER_SIDE)
         low = ends.min(axis=0) - half_side - 1.5 * resolution
         columns, rows = (int(v) for v in np.ceil(extent / resolution) + 4)
         frame = np.array([low[0], low[1], 1.0 / resolution])
-        return cls(stamp_squares(segments, frame, rows, columns, half_side), frame)
+        return cls(stamp_squares(segments, frame, rows, columns, half_side), frame, half_side)
 
     @classmethod
     def of_points(cls, points: Points, half_side: float, resolution: float) -> Raster:

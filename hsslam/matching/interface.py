@@ -7,6 +7,7 @@ once, in `Matcher.match`, which plugins inherit and do not override.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from hsslam.kernels.assess import assess
+from hsslam.kernels.assess import assess, degenerate_direction
 from hsslam.kernels.surface import Surface
 from hsslam.se2 import Points, Pose, wrap
 
@@ -106,6 +107,9 @@ class Estimate:
         Of the pose, if the method has one of its own; else the framework computes one.
     diagnostics : mapping
         Anything else worth knowing; JSON types only.
+    spread : float64 (3,), optional
+        Standard deviations (m, m, rad) of what the method itself leaves undecided, such as a plateau of its
+        fitness; added to the framework's covariance, which knows the returns' noise only.
     """
 
     pose: Pose
@@ -113,6 +117,7 @@ class Estimate:
     evaluations: int = 0
     covariance: NDArray[np.float64] | None = None
     diagnostics: Mapping[str, Any] = field(default_factory=dict)
+    spread: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -133,7 +138,9 @@ class MatchResult:
     evaluations : int
         Fitness evaluations or iterations spent.
     diagnostics : mapping
-        ``rejected`` tells why an answer was refused; the rest is the method's own.
+        ``rejected`` tells why an answer was refused; ``degenerate_direction`` (rad, in the reference's frame) is
+        there where the returns leave a direction open, such as that of a plain corridor; the rest is the
+        method's own.
     """
 
     pose: Pose
@@ -254,9 +261,14 @@ class Matcher(ABC, Generic[ConfigT]):
             pose, converged, covariance = guess, False, None
         pose = np.array([pose[0], pose[1], wrap(pose[2])])
         score, estimated = assess(reference.surface, points, pose, window.half, self.config.score_distance)
+        open_direction = degenerate_direction(estimated, window.half)
+        if not math.isnan(open_direction):
+            diagnostics = {**diagnostics, "degenerate_direction": open_direction}
+        if covariance is None:
+            covariance = estimated if found.spread is None else estimated + np.diag(found.spread**2)
         return MatchResult(
             pose=pose,
-            covariance=estimated if covariance is None else covariance,
+            covariance=covariance,
             score=score,
             converged=converged,
             evaluations=found.evaluations,
