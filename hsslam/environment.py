@@ -64,3 +64,16 @@ def _versions() -> dict[str, str]:
         except metadata.PackageNotFoundError:
             continue
     return found
+
+
+def peak_memory_mb() -> float:
+    """Largest resident memory of this process so far (10^6 bytes)."""
+    if sys.platform == "linux":
+        # getrusage keeps the peak of the process that started this one; the kernel's own mark begins afresh.
+        for line in Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines():
+            if line.startswith("VmHWM:"):
+                return float(line.split()[1]) * 1024.0 / 1e6
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / 1e6 if sys.platform == "darwin" else peak * 1024.0 / 1e6

@@ -6,12 +6,12 @@ import time
 
 import numpy as np
 import pytest
-from hsslam_plugins.hide import Hide, HideConfig
 from pydantic import ConfigDict, Field
 
 from hsslam.errors import MatcherUnavailableError
 from hsslam.matching import Estimate, MatchResult, create
 from hsslam.matching.conformance import check_matcher, conformance_checks, parametrize_with_checks
+from hsslam_plugins.hide import Hide, HideConfig
 
 CHECKS = dict(conformance_checks())
 

@@ -9,8 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hsslam_eval.protocols import make_pairs
-from hsslam_eval.trials import TrialConfig, TrialPair
 
 from hsslam.datasets.dataset import DatasetInfo
 from hsslam.datasets.simulator import SimulatedDataset, raycast
@@ -19,6 +17,8 @@ from hsslam.io.relations import Relations
 from hsslam.scan import LaserScan, ScanGeometry
 from hsslam.se2 import between_many, pose, transform
 from hsslam.trajectory import Trajectory
+from hsslam_eval.protocols import make_pairs
+from hsslam_eval.trials import TrialConfig, TrialPair
 
 CORNERS = np.array([[-3.0, -2.0], [4.0, -2.0], [4.0, 3.0], [1.0, 3.0], [1.0, 2.2], [-3.0, 2.2]])
 ROOM = np.column_stack((CORNERS, np.roll(CORNERS, -1, axis=0)))

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hsslam_eval.metrics import fill_in, relations_errors
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,6 +15,7 @@ from hsslam.errors import DataError
 from hsslam.io.relations import Relations
 from hsslam.se2 import between, between_many, compose, compose_many, pose
 from hsslam.trajectory import Trajectory
+from hsslam_eval.metrics import fill_in, relations_errors
 
 angles = st.floats(-3.1, 3.1)
 lengths = st.floats(-20.0, 20.0)

@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from hsslam_eval.statistics import bootstrap_interval, wilson_interval
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binomtest
+
+from hsslam_eval.statistics import bootstrap_interval, wilson_interval
 
 
 @pytest.mark.parametrize("statistic", ["mean", "median"])

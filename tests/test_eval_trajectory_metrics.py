@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from evo.core import metrics as evo_metrics  # type: ignore[import-untyped]
 from evo.core.trajectory import PosePath3D  # type: ignore[import-untyped]
-from hsslam_eval.metrics import align_rigid, ate, rpe
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hsslam.errors import ConfigError, DataError
 from hsslam.se2 import compose_many, pose, transform
 from hsslam.trajectory import Trajectory
+from hsslam_eval.metrics import align_rigid, ate, rpe
 
 seeds = st.integers(0, 10_000)
 

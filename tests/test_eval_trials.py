@@ -8,8 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from hsslam_eval.trial_config import SuccessThreshold
-from hsslam_eval.trials import TrialConfig, TrialPair, TrialResult, run_trial, run_trials, trial_guess
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -18,6 +16,8 @@ from pydantic import ValidationError
 from hsslam.errors import DataError
 from hsslam.matching import Estimate, Matcher, MatcherConfig, Reference, SearchWindow, create, register
 from hsslam.se2 import Points, Pose, inverse, pose, transform
+from hsslam_eval.trial_config import SuccessThreshold
+from hsslam_eval.trials import TrialConfig, TrialPair, TrialResult, run_trial, run_trials, trial_guess
 
 SQUARE = np.vstack([np.column_stack((np.linspace(0, 4, 41), np.full(41, y))) for y in (0.0, 3.0)])
 

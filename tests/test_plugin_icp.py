@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hsslam_plugins import open3d_library
-from hsslam_plugins.icp import Icp, line_normals
-from hsslam_plugins.local import keep_in_window
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hsslam.errors import ConfigError, MatcherUnavailableError
 from hsslam.matching import SearchWindow, create, describe
+from hsslam_plugins import open3d_library
+from hsslam_plugins.icp import Icp, line_normals
+from hsslam_plugins.local import keep_in_window
 
 WINDOW = SearchWindow(0.2, 0.2, np.radians(10.0))
 

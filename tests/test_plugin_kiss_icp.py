@@ -7,10 +7,10 @@ import sys
 
 import numpy as np
 import pytest
-from hsslam_plugins.kiss_icp import KissIcp
 
 from hsslam.errors import ConfigError, MatcherUnavailableError
 from hsslam.matching import SearchWindow, create, describe
+from hsslam_plugins.kiss_icp import KissIcp
 
 WINDOW = SearchWindow(0.2, 0.2, np.radians(10.0))
 

@@ -58,12 +58,11 @@ def _keep_to_one_thread() -> None:
 
 
 def _run(arguments: argparse.Namespace) -> tuple[TrialConfig, list[TrialResult], dict[str, str]]:
-    from hsslam_eval.trials import TrialConfig, TrialResult, make_pairs, run_trial, warm_up
-
     from hsslam.config import validate
     from hsslam.datasets.catalogue import open_dataset
     from hsslam.errors import MatcherUnavailableError
     from hsslam.matching import create
+    from hsslam_eval.trials import TrialConfig, TrialResult, make_pairs, run_trial, warm_up
 
     wanted = ("count", "protocol", "half_xy", "half_theta_deg", "seed")
     config = validate(TrialConfig, {name: getattr(arguments, name) for name in wanted})

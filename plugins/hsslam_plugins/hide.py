@@ -10,7 +10,6 @@ from hsslam.matching import Pose, SearchWindow
 from hsslam.search import NO_TRACE, HitFitness, PopulationMatcher, hide_search
 from hsslam_plugins.harmony_config import HarmonyConfig, effort
 
-
 WIDE_WEIGHT = 0.8
 """F in wide windows: the published 0.44 gathers the memory in one basin before it has seen the others."""
 

@@ -1,0 +1,197 @@
+"""One matcher's trials or SLAM run, in a process of its own: ``python -m hsslam_eval.worker OUT LABEL STAGE FD``.
+
+`hsslam_eval.compare` starts it. It reads what to do from the comparison's folder, writes its record there, and
+tells how far it is on the open file descriptor ``FD``, one JSON object a line. A process of its own makes the peak
+memory that matcher's, and a crash costs that matcher only.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+import traceback
+from dataclasses import asdict
+from itertools import islice
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from hsslam.config import Config
+from hsslam.datasets.dataset import Dataset
+from hsslam.errors import DataError, HsslamError, MatcherUnavailableError
+from hsslam_eval.comparison import Failure, MatcherTrials, SlamOutcome, write_record
+from hsslam_eval.workspace import Workspace
+
+_REPORT_EVERY = 0.1
+_WARM_UP_SCANS, _WARM_UP_STEP = 40, 5
+
+
+class Reporter:
+    """Writes progress to the parent, not more often than it can be seen."""
+
+    def __init__(self, descriptor: int) -> None:
+        self._file = os.fdopen(descriptor, "w", encoding="utf-8")
+        self._last = 0.0
+
+    def progress(self, stage: str, done: int, total: int) -> None:
+        """Say how far a stage is; ``total`` 0 where it is not known."""
+        now = perf_counter()
+        if now - self._last >= _REPORT_EVERY or done in (0, total):
+            self._last = now
+            self._line({"stage": stage, "done": done, "total": total})
+
+    def failure(self, failure: Failure) -> None:
+        """Say why there will be no result."""
+        self._line({"failure": asdict(failure)})
+
+    def _line(self, values: dict[str, Any]) -> None:
+        self._file.write(json.dumps(values) + "\n")
+        self._file.flush()
+
+
+def run_trials_stage(workspace: Workspace, label: str, reporter: Reporter) -> MatcherTrials:
+    """Run the trials of one matcher."""
+    from hsslam.matching import registry
+    from hsslam_eval.outcomes import trials_record
+    from hsslam_eval.trials import make_pairs, run_trials
+
+    reporter.progress("prepare", 0, 0)
+    contestant = workspace.contestant(label)
+    matcher = registry.create(contestant.name, contestant.parameters)
+    config = workspace.config.trial_config
+    pairs = make_pairs(workspace.dataset.open(), config)
+    result = run_trials(
+        label, matcher, pairs, config, lambda done, total: reporter.progress("trials", done, total)
+    )
+    return trials_record(result)
+
+
+def run_slam_stage(workspace: Workspace, label: str, reporter: Reporter) -> SlamOutcome:
+    """Run SLAM with one matcher and leave its run folder."""
+    from hsslam.environment import peak_memory_mb
+    from hsslam.slam.folder import RunFolder
+    from hsslam.slam.journal import Header
+    from hsslam.slam.pipeline import Slam
+    from hsslam_eval.outcomes import cpu_seconds, slam_record
+
+    reporter.progress("prepare", 0, 0)
+    contestant = workspace.contestant(label)
+    config = workspace.config.slam_config(contestant)
+    config.matcher.create()
+    dataset = workspace.dataset.open()
+    began = perf_counter()
+    _warm_up(config, dataset)
+    warm_up_seconds = perf_counter() - began
+
+    place = workspace.run_folder(label)
+    if place.exists():
+        # What a failed attempt left; its matches must not shorten the time of this one.
+        shutil.rmtree(place)
+    folder = RunFolder.create(place, dataset.info.name, label)
+    header = Header(workspace.source, config.model_dump(mode="json"))
+    total = workspace.scan_count(dataset)
+    with folder.begin(header, config) as journal:
+        began, cpu_began = perf_counter(), cpu_seconds()
+        slam = Slam(config)
+        for done, scan in enumerate(dataset.scans(), start=1):
+            for event in slam.process(scan):
+                journal.write(event)
+            reporter.progress("slam", done, max(total, done) if total else 0)
+        reporter.progress("optimise", 0, 0)
+        for event in slam.finish():
+            journal.write(event)
+        result = slam.result()
+        wall, cpu = perf_counter() - began, cpu_seconds() - cpu_began
+    peak = peak_memory_mb()
+    reporter.progress("map", 0, 0)
+    note = ""
+    try:
+        folder.write_result(result, config, title=f"{dataset.info.name}, {label}")
+    except DataError as error:  # a trajectory that ran away asks for too large a map; its errors still count
+        note = str(error)
+    record = slam_record(
+        result,
+        folder=place.relative_to(workspace.out).as_posix(),
+        relations=dataset.relations(),
+        truth=dataset.truth(),
+        wall_seconds=wall,
+        cpu_seconds=cpu,
+        warm_up_seconds=warm_up_seconds,
+        peak_memory_mb=peak,
+        note=note,
+    )
+    folder.write_json("metrics.json", _metrics(record, config, dataset))
+    folder.write_json("timings.json", _timings(record))
+    return record
+
+
+def main(arguments: list[str]) -> int:
+    """Do one stage; the exit code is 0 where its record was written."""
+    out, label, stage, descriptor = arguments
+    reporter = Reporter(int(descriptor))
+    try:
+        workspace = Workspace.open(Path(out))
+        run = run_trials_stage if stage == "trials" else run_slam_stage
+        write_record(workspace.record(label, stage), run(workspace, label, reporter))
+    except MatcherUnavailableError as error:
+        reporter.failure(Failure("unavailable", error.reason, error.remedy))
+    except HsslamError as error:
+        reporter.failure(Failure(stage, str(error)))
+    except Exception as error:  # whatever a matcher may raise: it costs its row only
+        traceback.print_exc()
+        reporter.failure(Failure(stage, f"{type(error).__name__}: {error}"))
+    else:
+        return 0
+    return 1
+
+
+def _warm_up(config: Config, dataset: Dataset) -> None:
+    """Run a short log through every stage, so that nothing is compiled or imported on the clock."""
+    from hsslam.slam.pipeline import Slam
+
+    eager = config.model_copy(
+        update={
+            "keyframes": config.keyframes.model_copy(update={"distance": 0.001, "angle_deg": 0.1}),
+            "loops": config.loops.model_copy(update={"min_gap": 1, "every": 1}),
+        }
+    )
+    scans = islice(dataset.scans(), 0, _WARM_UP_SCANS * _WARM_UP_STEP, _WARM_UP_STEP)
+    for _ in Slam(eager).run(scans):
+        pass
+
+
+def _metrics(record: SlamOutcome, config: Config, dataset: Dataset) -> dict[str, Any]:
+    errors = {name: summary for name, summary in asdict(record.accuracy).items() if summary is not None}
+    return {
+        "dataset": dataset.info.name,
+        "attribution": dataset.info.attribution,
+        "matcher": config.matcher.name,
+        "loop_matcher": (config.loop_matcher or config.matcher).name,
+        "seed": config.seed,
+        "scans": record.scans,
+        "duration_s": record.log_seconds,
+        "matched": record.matched,
+        "keyframes": record.keyframes,
+        "loops_tried": record.loops_tried,
+        "loops_accepted": record.loops_accepted,
+        **errors,
+    }
+
+
+def _timings(record: SlamOutcome) -> dict[str, Any]:
+    return {
+        "wall_s": record.wall_seconds,
+        "cpu_s": record.cpu_seconds,
+        "warm_up_s": record.warm_up_seconds,
+        "stages_s": record.stage_seconds,
+        "real_time_factor": record.real_time_factor,
+        "scans_per_s": record.scans / record.wall_seconds,
+        "peak_memory_mb": record.peak_memory_mb,
+        "resumed": False,
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,69 @@
+"""``hsslam config``: what a run would be told to do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from hsslam.cli import console
+from hsslam.cli.options import ConfigFile, MatcherName, Seed, Settings
+from hsslam.cli.settings import resolve
+
+app = typer.Typer(help="Show, check and explain settings.", rich_markup_mode=None, no_args_is_help=True)
+
+
+@app.command()
+def show(
+    config: ConfigFile = None,
+    matcher: MatcherName = None,
+    loop_matcher: Annotated[
+        str | None, typer.Option(metavar="NAME", help="The matcher that closes loops.")
+    ] = None,
+    seed: Seed = None,
+    settings: Settings = None,
+) -> None:
+    """Print the resolved settings as YAML: every value a run would use, ready for --config."""
+    from hsslam.config import dump
+
+    resolved = resolve(
+        file=config, matcher=matcher, loop_matcher=loop_matcher, seed=seed, settings=settings or ()
+    )
+    console.say(dump(resolved).rstrip())
+
+
+@app.command()
+def validate(file: Annotated[Path, typer.Argument(metavar="FILE", help="YAML settings.")]) -> None:
+    """Check a file of settings; says what is wrong and exits with 2 if anything is."""
+    resolve(file=file)
+    console.say(f"{file}: valid")
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of the settings, for editors; every matcher's parameters are in it."""
+    console.print_json(config_schema())
+
+
+def config_schema() -> dict[str, Any]:
+    """The JSON schema of `hsslam.config.Config`, with each installed matcher's parameters spelled out."""
+    from hsslam.config import Config
+    from hsslam.errors import MatcherUnavailableError
+    from hsslam.matching import registry
+
+    whole = Config.model_json_schema()
+    known = registry.names()
+    variants: list[dict[str, Any]] = [{"type": "string", "enum": known}]
+    for name in known:
+        try:
+            model = registry.load(name).Config
+        except MatcherUnavailableError:
+            continue
+        variant = model.model_json_schema(ref_template="#/$defs/{model}")
+        whole["$defs"].update(variant.pop("$defs", {}))
+        variant["properties"] = {"name": {"const": name}, **variant.get("properties", {})}
+        variant["required"] = ["name", *variant.get("required", [])]
+        variants.append(variant)
+    whole["$defs"]["MatcherSection"] = {"title": "Matcher", "anyOf": variants}
+    return whole

@@ -1,0 +1,56 @@
+"""Options that several verbs share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, TypeAlias
+
+import typer
+
+from hsslam.errors import ConfigError
+
+ConfigFile: TypeAlias = Annotated[
+    Path | None, typer.Option("--config", metavar="FILE", help="YAML settings; other options win over it.")
+]
+Settings: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="One setting, e.g. matcher.memory_size=40; may be repeated."
+    ),
+]
+MatcherName: TypeAlias = Annotated[
+    str | None, typer.Option("--matcher", metavar="NAME", help="The matcher; `hsslam matchers` lists them.")
+]
+Seed: TypeAlias = Annotated[
+    int | None, typer.Option("--seed", min=0, help="Every random choice follows from it; 0 where left out.")
+]
+Scans: TypeAlias = Annotated[
+    int | None, typer.Option("--scans", min=1, help="Use the first N scans only.", metavar="N")
+]
+DataDir: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "--data-dir", metavar="DIR", help="Where real logs are; $HSSLAM_DATA or a user folder if left out."
+    ),
+]
+Quiet: TypeAlias = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors and nothing else.")]
+AsJson: TypeAlias = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+OnError: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--on-error",
+        metavar="stop|skip",
+        help="A malformed line of the log stops the run (if left out), or is skipped and counted.",
+    ),
+]
+
+
+def policy(text: str | None) -> Literal["stop", "skip"]:
+    """Check what ``--on-error`` was given; raises `ConfigError`."""
+    match text:
+        case None | "stop":
+            return "stop"
+        case "skip":
+            return "skip"
+        case _:
+            raise ConfigError(f"--on-error is stop or skip, found {text!r}")

@@ -1,0 +1,102 @@
+"""``hsslam run``: SLAM over a log; leaves a run folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hsslam.cli import console
+from hsslam.cli.options import ConfigFile, DataDir, MatcherName, OnError, Quiet, Scans, Seed, Settings, policy
+from hsslam.cli.progress import progress
+from hsslam.cli.settings import resolve
+from hsslam.errors import ConfigError
+
+if TYPE_CHECKING:
+    from hsslam.slam.journal import Header
+
+
+def run(
+    dataset: Annotated[
+        str | None,
+        typer.Argument(metavar="DATASET|PATH", help="A name that `hsslam datasets` lists, or a log."),
+    ] = None,
+    matcher: MatcherName = None,
+    loop_matcher: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Another matcher for closing loops.")
+    ] = None,
+    config: ConfigFile = None,
+    settings: Settings = None,
+    seed: Seed = None,
+    scans: Scans = None,
+    data_dir: DataDir = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="The run folder; runs/<time>-<dataset>-<matcher> if left out."),
+    ] = None,
+    resume: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Go on with the run that died in this folder.")
+    ] = None,
+    quiet: Quiet = False,
+    on_error: OnError = None,
+) -> None:
+    """Run SLAM over a log; leaves a run folder.
+
+    In it: trajectories (TUM), the pose graph (g2o), the map (ROS), metrics, timings, the resolved settings.
+    Its files open in the usual tools.
+    """
+    from hsslam.cli.running import run_log, summary
+    from hsslam.datasets.catalogue import open_dataset
+    from hsslam.slam.folder import RunFolder
+    from hsslam.slam.journal import Header
+
+    if resume is not None and out is not None:
+        raise ConfigError("--resume goes on in its own folder; leave out --out")
+    folder = RunFolder.resume(resume) if resume is not None else None
+    died = folder.replay.header if folder is not None and folder.replay is not None else None
+    resolved = resolve(
+        file=config,
+        matcher=matcher,
+        loop_matcher=loop_matcher,
+        seed=seed,
+        settings=settings or (),
+        base=died.config if died is not None else None,
+    )
+    header = Header(_source(dataset, scans, on_error, died), resolved.model_dump(mode="json"))
+    if died is not None:
+        header.check_same(died, f"{resume}")
+    log = open_dataset(
+        header.dataset["source"],
+        data_dir=data_dir,
+        seed=resolved.seed,
+        scans=header.dataset["scans"],
+        on_error=policy(header.dataset["on_error"]),
+    )
+    resolved.matcher.create()  # a matcher that cannot run here is found before a folder is made
+    if folder is None:
+        folder = RunFolder.create(out, log.info.name, resolved.matcher.name)
+    try:
+        with progress(quiet) as shown:
+            metrics, timings = run_log(folder, header, resolved, log, shown)
+    except KeyboardInterrupt as error:
+        raise KeyboardInterrupt(f"go on with: hsslam run --resume {folder.path}") from error
+    if not quiet:
+        console.pairs(summary(folder, log, metrics, timings))
+        if log.info.attribution:
+            console.say(f"\n{log.info.attribution}")
+
+
+def _source(
+    dataset: str | None, scans: int | None, on_error: str | None, died: Header | None
+) -> dict[str, Any]:
+    """What opens the scans: told by the options; what they leave out, by the journal of the run that died."""
+    from hsslam.datasets.catalogue import names
+
+    if dataset is None and died is None:
+        raise ConfigError("say what to run on: a name that `hsslam datasets` lists, or a log")
+    if dataset is not None and dataset not in names() and Path(dataset).is_file():
+        dataset = str(Path(dataset).resolve())
+    told = {"source": dataset, "scans": scans, "on_error": on_error}
+    under = {"on_error": "stop", **(died.dataset if died is not None else {})}
+    return {**told, **{key: value for key, value in under.items() if told[key] is None}}

@@ -1,0 +1,113 @@
+"""A SLAM run from the first scan to the last file."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from hsslam.cli import accuracy
+from hsslam.cli.progress import Progress, Silence, watch_compiler
+from hsslam.config import Config
+from hsslam.datasets.dataset import Dataset
+from hsslam.datasets.file import FileDataset
+from hsslam.environment import peak_memory_mb
+from hsslam.slam.events import LoopChecked, SlamResult
+from hsslam.slam.folder import RunFolder
+from hsslam.slam.journal import Header
+from hsslam.slam.pipeline import Slam
+from hsslam_eval.accuracy import measure
+
+
+def run_log(
+    folder: RunFolder, header: Header, config: Config, log: Dataset, shown: Progress
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Run, judge, and write everything; returns what went into metrics.json and timings.json."""
+    total = log.info.scan_count or header.dataset["scans"] or _count(log, shown)
+    wall, cpu = time.perf_counter(), time.process_time()
+    with watch_compiler(shown), folder.begin(header, config) as journal:
+        slam = Slam(config, replay=folder.replay)
+        loops = 0
+        shown.stage("tracking", total, "scans")
+        for done, scan in enumerate(log.scans(), start=1):
+            for event in slam.process(scan):
+                journal.write(event)
+                loops += isinstance(event, LoopChecked) and event.accepted
+            shown.update(done, f"{loops} loops")
+        shown.stage("optimising the graph")
+        for event in slam.finish():
+            journal.write(event)
+        result = slam.result()
+        solved = time.perf_counter()
+        shown.stage("drawing the map")
+        folder.write_result(result, config, title=f"{log.info.name}, {config.matcher.name}")
+    metrics = _metrics(result, config, log)
+    timings = _timings(result, folder, wall, cpu, solved)
+    folder.write_json("metrics.json", metrics)
+    folder.write_json("timings.json", timings)
+    return metrics, timings
+
+
+def summary(
+    folder: RunFolder, log: Dataset, metrics: dict[str, Any], timings: dict[str, Any]
+) -> list[tuple[str, str]]:
+    """The lines that ``hsslam run`` prints at its end."""
+    duration = metrics["duration_s"]
+    return [
+        ("dataset", f"{log.info.name}: {metrics['scans']:,} scans, {duration:,.0f} s of driving"),
+        ("matcher", f"{metrics['matcher']}: {metrics['matched']:,} of {metrics['scans']:,} scans matched"),
+        ("wall time", f"{timings['wall_s']:.1f} s ({timings['real_time_factor']:.0f} times real time)"),
+        ("keyframes", f"{metrics['keyframes']:,}"),
+        ("loops", f"{metrics['loops_accepted']:,} accepted of {metrics['loops_tried']:,} tried"),
+        *([("skipped", f"{skipped:,} malformed lines")] if (skipped := metrics["skipped_lines"]) else []),
+        *accuracy.rows(metrics),
+        ("output", f"{folder.path}/"),
+    ]
+
+
+def _count(log: Dataset, shown: Progress) -> int | None:
+    """Scans in a log that does not say; without progress nobody needs to know."""
+    if isinstance(shown, Silence):
+        return None
+    shown.stage("counting the scans", unit="scans")
+    done = 0
+    for done, _ in enumerate(log.scans(), start=1):
+        shown.update(done)
+    return done
+
+
+def _metrics(result: SlamResult, config: Config, log: Dataset) -> dict[str, Any]:
+    stamps = result.odometry.stamps
+    errors = measure(result.trajectory, result.odometry, log.truth(), log.relations())
+    return {
+        "dataset": log.info.name,
+        "attribution": log.info.attribution,
+        "matcher": config.matcher.name,
+        "loop_matcher": (config.loop_matcher or config.matcher).name,
+        "seed": config.seed,
+        "scans": len(result.trajectory),
+        "duration_s": float(np.ptp(stamps)) if len(stamps) else 0.0,
+        "skipped_lines": log.statistics.skipped if isinstance(log, FileDataset) else 0,
+        "matched": result.matched,
+        "keyframes": len(result.keyframes),
+        "loops_tried": len(result.loops),
+        "loops_accepted": sum(loop.accepted for loop in result.loops),
+        **errors,
+        "statistics": result.statistics,
+    }
+
+
+def _timings(result: SlamResult, folder: RunFolder, wall: float, cpu: float, solved: float) -> dict[str, Any]:
+    now = time.perf_counter()
+    stamps = result.odometry.stamps
+    duration = float(np.ptp(stamps)) if len(stamps) else 0.0
+    return {
+        "wall_s": now - wall,
+        "cpu_s": time.process_time() - cpu,
+        "stages_s": {**result.seconds, "output": now - solved},
+        "real_time_factor": duration / (now - wall),
+        "scans_per_s": len(result.trajectory) / (now - wall),
+        "peak_memory_mb": peak_memory_mb(),
+        "resumed": folder.replay is not None,
+    }

@@ -1,0 +1,1 @@
+"""Occupancy grids from scans and poses: building, writing, drawing and measuring them."""
