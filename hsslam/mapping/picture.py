@@ -91,16 +91,17 @@ def draw_map(
         axes.plot(x[-1:], y[-1:], marker="s", label="end", **ends)
     ties = np.asarray(() if loops is None else loops, dtype=np.float64).reshape(-1, 2, 2)
     if len(ties):
-        # The white rim keeps a short tie visible over the line of the trajectory, in grey too.
-        for colour, line_width, label in (
-            ("white", 4.0, None),
-            (_LOOP_COLOUR, 2.0, f"loop closures ({len(ties)})"),
-        ):
-            axes.add_collection(
-                LineCollection(
-                    list(ties), colors=colour, linewidths=line_width, capstyle="round", label=label, zorder=3
-                )
+        # Thin and behind the trajectory: a log that comes back often has thousands of ties.
+        axes.add_collection(
+            LineCollection(
+                list(ties),
+                colors=_LOOP_COLOUR,
+                linewidths=0.6,
+                alpha=0.7,
+                label=f"loop closures ({len(ties)})",
+                zorder=1.5,
             )
+        )
     axes.set_xlim(*grid.extent[:2])
     axes.set_ylim(*grid.extent[2:])
     axes.set_aspect("equal")
