@@ -32,7 +32,13 @@ def hits_twin(raster: Raster, points: NDArray[np.float64], pose: NDArray[np.floa
     v = s * scaled[:, 0] + c * scaled[:, 1] + offset[1]
     rows, columns = raster.cells.shape
     u, v = np.clip(u, 0, columns - 1).astype(int), np.clip(v, 0, rows - 1).astype(int)
-    return int(raster.cells[v, u].sum())
+    return int(raster.cells[v, u].astype(int).sum())
+
+
+def build(smooth: bool, reference: NDArray[np.float64]) -> Raster:
+    if smooth:
+        return Raster.smooth(Surface.build(reference).segments, 0.05, 0.025)
+    return Raster.of_points(reference, 0.05, 0.025)
 
 
 def hits(raster: Raster, points: NDArray[np.float64], pose: NDArray[np.float64], at_least: int = 0) -> int:
@@ -42,22 +48,29 @@ def hits(raster: Raster, points: NDArray[np.float64], pose: NDArray[np.float64],
     )
 
 
+@pytest.mark.parametrize("smooth", [False, True])
 @given(clouds, clouds, poses)
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=30)
 def test_hits_agree_with_numpy(
-    reference: NDArray[np.float64], points: NDArray[np.float64], pose: NDArray[np.float64]
+    smooth: bool, reference: NDArray[np.float64], points: NDArray[np.float64], pose: NDArray[np.float64]
 ) -> None:
-    raster = Raster.of_points(reference, 0.05, 0.025)
+    raster = build(smooth, reference)
     # Fused multiply-add may round a point on a cell's edge to the other side.
-    assert abs(hits(raster, points, pose) - hits_twin(raster, points, pose)) <= 1
+    assert abs(hits(raster, points, pose) - hits_twin(raster, points, pose)) <= raster.frame[3]
 
 
+@pytest.mark.parametrize("smooth", [False, True])
 @given(clouds, clouds, poses, st.integers(0, 200))
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=30)
 def test_early_rejection_never_changes_a_count_that_matters(
-    reference: NDArray[np.float64], points: NDArray[np.float64], pose: NDArray[np.float64], at_least: int
+    smooth: bool,
+    reference: NDArray[np.float64],
+    points: NDArray[np.float64],
+    pose: NDArray[np.float64],
+    at_least: int,
 ) -> None:
-    raster = Raster.of_points(reference, 0.05, 0.025)
+    raster = build(smooth, reference)
+    at_least *= int(raster.frame[3])
     whole, rejected = hits(raster, points, pose), hits(raster, points, pose, at_least)
     assert rejected == whole if whole >= at_least else rejected in (whole, -1)
 
@@ -81,6 +94,19 @@ def test_surface_counts_between_the_points_and_paper_does_not() -> None:
     between = reference[:-1] + [0.15, 0.0]
     assert hits(Raster.of_points(reference, 0.05, 0.025), between, np.zeros(3)) == 0
     assert hits(Raster.build(Surface.build(reference).segments, 0.05, 0.025), between, np.zeros(3)) == 4
+
+
+@given(clouds)
+@settings(deadline=None, max_examples=20)
+def test_smooth_field_is_a_gaussian_of_the_distance(points: NDArray[np.float64]) -> None:
+    segments = np.hstack((points, points))
+    raster = Raster.smooth(segments, 0.05, 0.025)
+    rows, columns = np.nonzero(raster.cells)
+    places = raster.frame[:2] + (np.column_stack((columns, rows)) + 0.5) / raster.frame[2]
+    distance = np.linalg.norm(places[:, None] - points[None], axis=-1).min(axis=1)
+    expected = 255.0 * np.exp(-0.5 * (distance / 0.05) ** 2)
+    assert np.abs(raster.cells[rows, columns] - expected).max() <= 0.51
+    assert distance.max() <= 2.5 * 0.05 + 1e-9
 
 
 def corner(spacing: float = 0.03) -> NDArray[np.float64]:

@@ -147,3 +147,38 @@ def test_trace_never_falls_and_ends_at_the_answer(name: str, room_pair: Pair) ->
     assert (np.diff(trace[:, 3]) >= 0).all()
     assert trace[-1, 3] == hits
     assert (trace[-1, :3] == pose).all()
+
+
+@pytest.mark.parametrize(("name", "budget"), [("hsl", "improvisations"), ("hide", "evaluations")])
+def test_patience_ends_a_search_that_changes_nothing(name: str, budget: str, room_pair: Pair) -> None:
+    reference, scan, truth = room_pair
+    matcher = create(name, {budget: 20_000, "patience": 100})
+    result = matcher.match(matcher.prepare(reference), scan, truth, WINDOW, np.random.default_rng(1))
+    assert 130 <= result.evaluations < 10_000
+    assert np.hypot(*(result.pose - truth)[:2]) < 0.03
+
+
+@pytest.mark.parametrize("fitness", ["paper", "surface", "likelihood"])
+@pytest.mark.parametrize("name", POPULATION)
+def test_every_fitness_serves_every_search(name: str, fitness: str, room_pair: Pair) -> None:
+    reference, scan, truth = room_pair
+    matcher = create(name, {"fitness": fitness, "refine": False})
+    prepared = matcher.prepare(reference)
+    result = matcher.match(prepared, scan, truth + [0.08, -0.08, 0.08], WINDOW, np.random.default_rng(2))
+    assert 0.0 < result.diagnostics["fitness"] <= 1.0
+    assert np.hypot(*(result.pose - truth)[:2]) < 0.08
+
+
+@pytest.mark.parametrize("name", ["hsl", "hide"])
+def test_a_wide_window_is_searched_wider(name: str, room_pair: Pair) -> None:
+    reference, scan, truth = room_pair
+    wide = SearchWindow(1.0, 1.0, math.radians(45.0))
+    matcher = create(name)
+    prepared = matcher.prepare(reference)
+    rng = np.random.default_rng(5)
+    errors = []
+    for seed in range(20):
+        guess = truth + rng.uniform(-1.0, 1.0, 3) * wide.half
+        result = matcher.match(prepared, scan, guess, wide, np.random.default_rng(seed))
+        errors.append(np.hypot(*(result.pose - truth)[:2]))
+    assert np.mean(np.array(errors) < 0.05) >= 0.9

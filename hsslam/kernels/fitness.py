@@ -1,4 +1,4 @@
-"""Fitness of a pose: how many of a scan's points hit a raster (paper, equations 9 and 10)."""
+"""Fitness of a pose: what a scan's points are worth on a raster (paper, equations 9 and 10)."""
 
 from __future__ import annotations
 
@@ -24,20 +24,22 @@ def count_hits(
     theta: float,
     at_least: int,
 ) -> int:
-    """Points that hit the raster at a pose, or -1 as soon as fewer than ``at_least`` can.
+    """Sum of the points' worth on a raster (their hits, if it is a raster of squares) at a pose.
+
+    Gives up with -1 as soon as the sum can no longer reach ``at_least``.
 
     Parameters
     ----------
     cells : uint8 (H, W)
         A `Raster`'s cells; its border must be zero.
-    frame : float64 (3,)
+    frame : float64 (4,)
         The raster's frame.
     xs, ys : float32 (N,)
         The scan's points in cells (metres times ``frame[2]``).
     x, y, theta : float
         Candidate pose (m, m, rad).
     at_least : int
-        Hits below which the count is of no interest.
+        Sum below which the answer is of no interest.
     """
     rows, columns = cells.shape
     flat = cells.reshape(rows * columns)
@@ -50,6 +52,7 @@ def count_hits(
     # Unsigned, so that the look-up needs no branch for indices counted from the end.
     index = np.empty(CHUNK, dtype=np.uint32)
     stride = np.int32(columns)
+    most = int(frame[3])
     hits = 0
     start = 0
     while start < n:
@@ -63,6 +66,6 @@ def count_hits(
         for i in range(stop - start):
             hits += flat[index[i]]
         start = stop
-        if hits + n - start < at_least:
+        if hits + most * (n - start) < at_least:
             return -1
     return hits

@@ -12,7 +12,7 @@ from hsslam.kernels.raster import Raster
 from hsslam.kernels.surface import Surface
 from hsslam.se2 import Points
 
-FitnessName: TypeAlias = Literal["paper", "surface"]
+FitnessName: TypeAlias = Literal["paper", "surface", "likelihood"]
 FITNESS_NAMES: tuple[str, ...] = get_args(FitnessName)
 
 
@@ -39,6 +39,10 @@ class HitFitness:
         scaled = np.ascontiguousarray((points * raster.frame[2]).T, dtype=np.float32)
         return cls(raster.cells, raster.frame, scaled[0], scaled[1])
 
+    def share(self, hits: int) -> float:
+        """What a sum of worths is of the most there could be, in [0, 1]."""
+        return hits / (self.frame[3] * len(self.xs))
+
 
 def build_raster(
     name: FitnessName, points: Points, surface: Surface, half_side: float, resolution: float
@@ -50,13 +54,16 @@ def build_raster(
     name : str
         ``paper``: squares centred on the points, as published. ``surface``: squares along the segments between
         neighbouring points, so that a wall counts as a wall and not as the beams that happened to hit it.
+        ``likelihood``: a Gaussian of the distance from those segments, in steps of 1/255.
     points : Points
         (N, 2) m, the reference.
     surface : Surface
         Through these points.
     half_side, resolution : float
-        Of a square, and of a cell (m).
+        Of a square (of ``likelihood``: its standard deviation), and of a cell (m).
     """
     if name == "paper":
         return Raster.of_points(points, half_side, resolution)
+    if name == "likelihood":
+        return Raster.smooth(surface.segments, half_side, resolution)
     return Raster.build(surface.segments, half_side, resolution)

@@ -85,6 +85,7 @@ def harmony_search(
     bandwidth_min: NDArray[np.float64],
     bandwidth_max: NDArray[np.float64],
     improvisations: int,
+    patience: int,
     rng: np.random.Generator,
     trace: NDArray[np.float64],
 ) -> tuple[Pose, int, int]:
@@ -108,6 +109,9 @@ def harmony_search(
         BW_min and BW_max (equation 3; m, m, rad).
     improvisations : int
         NI.
+    patience : int
+        The search ends after this many improvisations in a row that did not enter the memory, whose average
+        fitness then has not changed (paper, section 4.4); 0 to use up NI in any case.
     rng : numpy.random.Generator
         Source of every random choice.
     trace : float64 (E, 4)
@@ -125,7 +129,10 @@ def harmony_search(
     bandwidth = np.empty(3)
     worst = int(np.argmin(hits))
     par_min, par_max = pitch_adjusting_rates
+    idle = spent = 0
     for t in range(improvisations):
+        if 0 < patience <= idle:
+            break
         share = t / improvisations
         for d in range(3):
             bandwidth[d] = bandwidth_max[d] * math.exp(math.log(bandwidth_min[d] / bandwidth_max[d]) * share)
@@ -136,7 +143,10 @@ def harmony_search(
             memory[worst] = candidate
             hits[worst] = found
             worst = int(np.argmin(hits))
+            idle = 0
+        spent += 1
+        idle += 1
         if memory_size + t < trace.shape[0]:
             record(trace, memory_size + t, memory, hits)
     best = int(np.argmax(hits))
-    return memory[best].copy(), hits[best], memory_size + improvisations
+    return memory[best].copy(), hits[best], memory_size + spent

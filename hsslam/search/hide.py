@@ -66,6 +66,7 @@ def hide_search(
     attraction: float,
     weight: float,
     crossover_rate: float,
+    patience: int,
     rng: np.random.Generator,
     trace: NDArray[np.float64],
 ) -> tuple[Pose, int, int]:
@@ -77,7 +78,7 @@ def hide_search(
     Parameters
     ----------
     cells, frame, xs, ys, guess, half, memory_size, memory_considering_rate, pitch_adjusting_rates, \
-bandwidth_min, bandwidth_max, rng, trace
+bandwidth_min, bandwidth_max, patience, rng, trace
         As for `hsslam.search.harmony.harmony_search`.
     budget : int
         NFE: evaluations after the memory was filled.
@@ -101,8 +102,8 @@ bandwidth_min, bandwidth_max, rng, trace
     candidate = np.empty(3)
     bandwidth = np.empty(3)
     par_min, par_max = pitch_adjusting_rates
-    spent = 0
-    while spent < budget:
+    idle = spent = 0
+    while spent < budget and not 0 < patience <= idle:
         worst = int(np.argmin(hits))
         for _ in range(min(harmony_run, budget - spent)):
             share = spent / budget
@@ -116,10 +117,12 @@ bandwidth_min, bandwidth_max, rng, trace
                 cells, frame, xs, ys, candidate[0], candidate[1], candidate[2], hits[worst] + 1
             )
             spent += 1
+            idle += 1
             if found > hits[worst]:
                 memory[worst] = candidate
                 hits[worst] = found
                 worst = int(np.argmin(hits))
+                idle = 0
             if memory_size + spent - 1 < trace.shape[0]:
                 record(trace, memory_size + spent - 1, memory, hits)
         best = int(np.argmax(hits))
@@ -129,9 +132,11 @@ bandwidth_min, bandwidth_max, rng, trace
                 cells, frame, xs, ys, candidate[0], candidate[1], candidate[2], hits[target] + 1
             )
             spent += 1
+            idle += 1
             if found > hits[target]:
                 memory[target] = candidate
                 hits[target] = found
+                idle = 0
                 if found > hits[best]:
                     best = target
             if memory_size + spent - 1 < trace.shape[0]:

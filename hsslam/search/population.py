@@ -34,7 +34,8 @@ class PopulationConfig(MatcherConfig):
 
     fitness: FitnessName = Field(
         "surface",
-        description="`paper`: squares around the points; `surface`: squares along the segments between them",
+        description="`paper`: squares around the points; `surface`: squares along the segments between them; "
+        "`likelihood`: a smooth field around these",
     )
     half_side: float = Field(0.05, gt=0.0, le=1.0, description="half side of the squares of the fitness (m)")
     resolution: float = Field(0.025, gt=0.0, le=0.5, description="side of a raster cell of the fitness (m)")
@@ -118,7 +119,7 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
         raster = reference.coarse if self.is_wide(window) else reference.raster
         fitness = HitFitness.of(raster, points)
         found, hits, evaluations = self.search(fitness, guess, window, rng)
-        diagnostics: dict[str, Any] = {"fitness": hits / len(points)}
+        diagnostics: dict[str, Any] = {"fitness": fitness.share(hits)}
         if not self.config.refine:
             spread = plateau(points, raster.half_side)
             return Estimate(found, evaluations=evaluations, spread=spread, diagnostics=diagnostics)

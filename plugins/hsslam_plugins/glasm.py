@@ -16,7 +16,8 @@ class GlasmConfig(PopulationConfig):
 
     fitness: FitnessName = Field(
         "paper",
-        description="`paper`: squares around the points; `surface`: squares along the segments between them",
+        description="`paper`: squares around the points; `surface`: squares along the segments between them; "
+        "`likelihood`: a smooth field around these",
     )
     half_side: float = Field(
         0.0525, gt=0.0, le=1.0, description="half side of the squares of the fitness (m): 10.5 cm squares"

@@ -37,6 +37,9 @@ class HarmonyConfig(PopulationConfig):
         description="largest pitch adjustment at the end (BW_min; cm for x and y, degrees for theta)",
     )
 
+    patience: int = Field(
+        0, ge=0, description="end after this many evaluations that changed nothing (0: use up the budget)"
+    )
     wide_windows: bool = Field(
         True,
         description="in windows far larger than the paper's: a larger memory, budget and bandwidth, a coarser raster",

@@ -64,6 +64,7 @@ class Hide(PopulationMatcher[HideConfig]):
             config.attraction,
             WIDE_WEIGHT if scaled.wide else config.weight,
             config.crossover_rate,
+            config.patience,
             rng,
             trace,
         )

@@ -51,6 +51,7 @@ class Hsl(PopulationMatcher[HslConfig]):
             scaled.bandwidth_min,
             scaled.bandwidth_max,
             scaled.budget,
+            config.patience,
             rng,
             trace,
         )
