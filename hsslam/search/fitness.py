@@ -41,7 +41,7 @@ class HitFitness:
 
     def share(self, hits: int) -> float:
         """What a sum of worths is of the most there could be, in [0, 1]."""
-        return hits / (self.frame[3] * len(self.xs))
+        return hits / float(self.frame[3] * len(self.xs))
 
 
 def build_raster(
