@@ -101,7 +101,7 @@ def read_rosmap(path: Path | str) -> OccupancyGrid:
         raise DataError(f"{path}: cannot be read: {error.strerror}") from error
     except (KeyError, TypeError, ValueError, yaml.YAMLError) as error:
         raise DataError(
-            f"{path}: expected the settings of a ROS map, found none or a bad one ({error})"
+            f"{path}: expected the settings of a ROS map, found none or a bad one ({' '.join(str(error).split())})"
         ) from error
     if not (resolution > 0.0 and origin.shape == (2,) and np.isfinite(origin).all()):
         raise DataError(f"{path}: resolution must be positive and origin three finite numbers")
@@ -114,28 +114,19 @@ def read_rosmap(path: Path | str) -> OccupancyGrid:
 
 
 def _read_pgm(path: Path) -> NDArray[np.uint8]:
+    from PIL import Image, UnidentifiedImageError
+
     try:
-        data = path.read_bytes()
+        with Image.open(path, formats=["PPM"]) as picture:
+            pixels = np.asarray(picture)
+    except (UnidentifiedImageError, ValueError, SyntaxError, EOFError) as error:
+        raise DataError(
+            f"{path}: expected a binary PGM picture of 8 bits, found something else ({error})"
+        ) from error
     except OSError as error:
-        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
-    words: list[bytes] = []
-    at = 0
-    while len(words) < 4 and at < len(data):
-        # Words of the header are parted by white space; a # comments out the rest of its line.
-        if data[at : at + 1] == b"#":
-            end = data.find(b"\n", at)
-            at = end if end >= 0 else len(data)
-        elif data[at : at + 1].isspace():
-            at += 1
-        else:
-            start = at
-            while at < len(data) and not data[at : at + 1].isspace():
-                at += 1
-            words.append(data[start:at])
-    if len(words) < 4 or words[0] != b"P5" or words[3] != b"255" or not (words[1] + words[2]).isdigit():
-        raise DataError(f"{path}: expected a binary PGM picture of 8 bits (P5, 255)")
-    columns, rows = int(words[1]), int(words[2])
-    pixels = np.frombuffer(data, dtype=np.uint8, offset=min(at + 1, len(data)))
-    if len(pixels) < rows * columns:
-        raise DataError(f"{path}: expected {columns} x {rows} pixels, found {len(pixels)}")
-    return pixels[: rows * columns].reshape(rows, columns)
+        raise DataError(f"{path}: cannot be read: {error.strerror or error}") from error
+    if pixels.ndim != 2 or pixels.dtype != np.uint8:
+        raise DataError(
+            f"{path}: expected one channel of 8 bits, found {pixels.dtype} of shape {pixels.shape}"
+        )
+    return pixels
