@@ -7,7 +7,18 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from hsslam.cli import compare, config, console, datasets, evaluate, interrupt, match, matchers, run
+from hsslam.cli import (
+    compare,
+    config,
+    console,
+    datasets,
+    evaluate,
+    interrupt,
+    match,
+    matchers,
+    reproduce,
+    run,
+)
 from hsslam.errors import HsslamError
 from hsslam.version import __version__
 
@@ -55,6 +66,7 @@ app.command("run")(run.run)
 app.command("compare", cls=compare.ManyMatchers)(compare.compare)
 app.command("match")(match.match)
 app.command("eval")(evaluate.evaluate)
+app.command("reproduce")(reproduce.reproduce)
 app.add_typer(matchers.app, name="matchers")
 app.add_typer(datasets.app, name="datasets")
 app.add_typer(config.app, name="config")
