@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from hsslam.matching import Pose, SearchWindow
-from hsslam.search import NO_TRACE, HitFitness, PopulationMatcher, hide_search
-from hsslam_plugins.harmony_config import HarmonyConfig, effort
+from hsslam.search import NO_TRACE, HitFitness, hide_search
+from hsslam_plugins.harmony import HarmonyConfig, HarmonyMatcher
 
 WIDE_WEIGHT = 0.8
 """F in wide windows: the published 0.44 gathers the memory in one basin before it has seen the others."""
@@ -26,15 +26,16 @@ class HideConfig(HarmonyConfig):
     )
 
 
-class Hide(PopulationMatcher[HideConfig]):
+class Hide(HarmonyMatcher[HideConfig]):
     """Harmony search and differential evolution in turn over the window."""
 
     Config = HideConfig
     summary = "harmony search improved by differential evolution (paper, section 5)"
 
-    def is_wide(self, window: SearchWindow) -> bool:
-        """See `hsslam_plugins.harmony_config.Effort`."""
-        return effort(self.config, self.config.evaluations, window).wide
+    @property
+    def budget(self) -> int:
+        """See `HideConfig.evaluations`."""
+        return self.config.evaluations
 
     def search(
         self,
@@ -46,7 +47,7 @@ class Hide(PopulationMatcher[HideConfig]):
     ) -> tuple[Pose, int, int]:
         """See `hsslam.search.hide_search`."""
         config = self.config
-        scaled = effort(config, config.evaluations, window)
+        scaled = self.effort(window)
         return hide_search(
             fitness.cells,
             fitness.frame,

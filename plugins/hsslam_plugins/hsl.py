@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from hsslam.matching import Pose, SearchWindow
-from hsslam.search import NO_TRACE, HitFitness, PopulationMatcher, harmony_search
-from hsslam_plugins.harmony_config import HarmonyConfig, effort
+from hsslam.search import NO_TRACE, HitFitness, harmony_search
+from hsslam_plugins.harmony import HarmonyConfig, HarmonyMatcher
 
 
 class HslConfig(HarmonyConfig):
@@ -17,15 +17,16 @@ class HslConfig(HarmonyConfig):
     improvisations: int = Field(250, ge=1, description="new harmonies made (NI)")
 
 
-class Hsl(PopulationMatcher[HslConfig]):
+class Hsl(HarmonyMatcher[HslConfig]):
     """Harmony search over the window."""
 
     Config = HslConfig
     summary = "harmony search (paper, section 4)"
 
-    def is_wide(self, window: SearchWindow) -> bool:
-        """See `hsslam_plugins.harmony_config.Effort`."""
-        return effort(self.config, self.config.improvisations, window).wide
+    @property
+    def budget(self) -> int:
+        """See `HslConfig.improvisations`."""
+        return self.config.improvisations
 
     def search(
         self,
@@ -37,7 +38,7 @@ class Hsl(PopulationMatcher[HslConfig]):
     ) -> tuple[Pose, int, int]:
         """See `hsslam.search.harmony_search`."""
         config = self.config
-        scaled = effort(config, config.improvisations, window)
+        scaled = self.effort(window)
         return harmony_search(
             fitness.cells,
             fitness.frame,

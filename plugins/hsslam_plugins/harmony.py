@@ -1,16 +1,19 @@
-"""Parameters that HSL and HIDE share."""
+"""What HSL and HIDE share: their parameters, and how these grow with the window."""
 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from hsslam.matching import SearchWindow
-from hsslam.search import PopulationConfig
+from hsslam.search import PopulationConfig, PopulationMatcher
 
 
 class HarmonyConfig(PopulationConfig):
@@ -64,6 +67,9 @@ WIDE_FROM = 1.5
 """Parameters change for windows this many times as large along each axis, on geometric average."""
 
 
+EFFORTS_KEPT = 64
+
+
 @dataclass(frozen=True)
 class Effort:
     """Parameters of one search, the window taken into account.
@@ -87,15 +93,43 @@ class Effort:
     bandwidth_max: NDArray[np.float64]
 
 
-def effort(config: HarmonyConfig, budget: int, window: SearchWindow) -> Effort:
-    """Parameters for a window; as configured unless it is wide (and ``wide_windows`` is on)."""
-    low, high = bandwidth(config.bandwidth_min), bandwidth(config.bandwidth_max)
-    growth = float(np.prod(window.half / PAPER_WINDOW.half)) ** (1.0 / 3.0)
-    if not config.wide_windows or growth < WIDE_FROM:
-        return Effort(False, config.memory_size, budget, low, high)
-    return Effort(
-        True, round(config.memory_size * growth), round(budget * growth**2), low, high * math.sqrt(growth)
-    )
+HarmonyConfigT = TypeVar("HarmonyConfigT", bound=HarmonyConfig)
+
+
+class HarmonyMatcher(PopulationMatcher[HarmonyConfigT], Generic[HarmonyConfigT]):
+    """Base of HSL and HIDE: how much effort a window is worth."""
+
+    @property
+    @abstractmethod
+    def budget(self) -> int:
+        """Evaluations after the memory is filled, as configured."""
+
+    def is_wide(self, window: SearchWindow) -> bool:
+        """Whether the window is far larger than the paper's."""
+        return self.effort(window).wide
+
+    def effort(self, window: SearchWindow) -> Effort:
+        """Parameters for a window; as configured unless it is wide (and ``wide_windows`` is on)."""
+        known = self._efforts.get(window)
+        if known is None:
+            # Windows come from a few settings; a caller that makes ever new ones must not fill the memory.
+            if len(self._efforts) >= EFFORTS_KEPT:
+                self._efforts.clear()
+            known = self._efforts[window] = self._effort(window)
+        return known
+
+    @cached_property
+    def _efforts(self) -> dict[SearchWindow, Effort]:
+        return {}
+
+    def _effort(self, window: SearchWindow) -> Effort:
+        config = self.config
+        low, high = bandwidth(config.bandwidth_min), bandwidth(config.bandwidth_max)
+        growth = float(np.prod(window.half / PAPER_WINDOW.half)) ** (1.0 / 3.0)
+        if not config.wide_windows or growth < WIDE_FROM:
+            return Effort(False, config.memory_size, self.budget, low, high)
+        memory_size, budget = round(config.memory_size * growth), round(self.budget * growth**2)
+        return Effort(True, memory_size, budget, low, high * math.sqrt(growth))
 
 
 def bandwidth(value: float) -> NDArray[np.float64]:
