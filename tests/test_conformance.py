@@ -17,7 +17,9 @@ CHECKS = dict(conformance_checks())
 
 
 @pytest.mark.parametrize("check", CHECKS)
-@pytest.mark.parametrize("name", ["glasm", "hide", "hsl", "icp", "kiss_icp"])
+@pytest.mark.parametrize(
+    "name", ["csm", "exhaustive", "glasm", "hide", "hsl", "icp", "kiss_icp", "pl_icp", "small_gicp"]
+)
 def test_built_in_matchers_conform(name: str, check: str) -> None:
     try:
         matcher = create(name)

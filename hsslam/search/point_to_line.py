@@ -1,0 +1,103 @@
+"""Point-to-line ICP with correspondences from a raster of the nearest surface that reaches far."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam.kernels.refine import refine
+from hsslam.kernels.surface import MAXIMUM_CELLS_PER_SIDE, rasterise_nearest
+from hsslam.matching.interface import Reference
+from hsslam.se2 import Points, Pose
+
+RESOLUTION = 0.1
+"""Side of a cell of the far raster (m); the last stage uses the surface's own, which is finer."""
+
+
+class PointToLineReference(Reference):
+    """A reference whose nearest segment is known from afar.
+
+    Parameters
+    ----------
+    points : Points
+        (N, 2) m in beam order.
+    reach : float
+        How far from the surface (m).
+    """
+
+    def __init__(self, points: Points, reach: float) -> None:
+        super().__init__(points)
+        self.far, self.far_frame = _nearest(self.surface.segments, reach)
+
+
+def _nearest(segments: NDArray[np.float64], reach: float) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    if len(segments) == 0:
+        return np.full((1, 1), -1, dtype=np.int32), np.array([0.0, 0.0, 1.0])
+    ends = segments.reshape(-1, 2)
+    low = ends.min(axis=0) - reach
+    extent = ends.max(axis=0) + reach - low
+    resolution = max(RESOLUTION, float(extent.max()) / MAXIMUM_CELLS_PER_SIDE)
+    columns, rows = (int(v) for v in np.ceil(extent / resolution) + 1)
+    frame = np.array([low[0], low[1], 1.0 / resolution])
+    return rasterise_nearest(segments, frame, rows, columns, reach), frame
+
+
+def point_to_line_icp(
+    reference: PointToLineReference,
+    points: Points,
+    guess: Pose,
+    iterations: int,
+    distances: tuple[float, float, float],
+    scales: tuple[float, float],
+) -> tuple[Pose, int, bool]:
+    """Move a pose from a guess to where points lie on the lines of a reference (Censi, "An ICP variant ...", 2008).
+
+    Two stages: the first reaches far, its correspondences shrinking from ``distances[0]`` to ``distances[1]``;
+    the second is precise, from there to ``distances[2]``.
+
+    Parameters
+    ----------
+    reference : PointToLineReference
+        What is matched against.
+    points : Points
+        (N, 2) m, the scan.
+    guess : Pose
+        Where to begin.
+    iterations : int
+        Of each stage, at most.
+    distances : (float, float, float)
+        Reaches of a correspondence (m); the last two at most the surface's own, 0.15 m.
+    scales : (float, float)
+        Of the Cauchy weight in each stage (m).
+
+    Returns
+    -------
+    (Pose, int, bool)
+        The pose, iterations spent, and whether the last stage came to rest.
+    """
+    surface = reference.surface
+    coarse, first, _ = refine(
+        surface.segments,
+        surface.lines,
+        reference.far,
+        reference.far_frame,
+        points,
+        guess,
+        iterations,
+        distances[0],
+        distances[1],
+        scales[0],
+    )
+    fine, second, converged = refine(
+        surface.segments,
+        surface.lines,
+        surface.nearest,
+        surface.frame,
+        points,
+        coarse,
+        iterations,
+        distances[1],
+        distances[2],
+        scales[1],
+    )
+    return fine, first + second, converged
