@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -106,6 +107,6 @@ def test_fewer_beams_keep_the_field_of_view() -> None:
         ({"no_return": 1.0}, "no_return"),
     ],
 )
-def test_an_impossible_laser_is_refused(change: dict[str, float], message: str) -> None:
+def test_an_impossible_laser_is_refused(change: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         replace(laser_model("sick-lms200"), **change)

@@ -25,7 +25,7 @@ def reproduce(
     what: Annotated[
         str,
         typer.Argument(
-            metavar="EXPERIMENT", help="table1, table2, fig7, fig8, fig9, fig10, maps, benchmarks or all."
+            metavar="EXPERIMENT", help="table1, table2, fig7, fig8, fig9, fig10, maps or all."
         ),
     ],
     dataset: Annotated[
