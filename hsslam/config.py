@@ -105,7 +105,7 @@ class KeyframeSection(Section):
 
     distance: float = Field(0.2, gt=0.0, description="a keyframe after this much travel (m)")
     angle_deg: float = Field(10.0, gt=0.0, description="or after this much turning (deg)")
-    submap_size: int = Field(15, ge=1, description="newest keyframes in the local submap")
+    submap_size: int = Field(10, ge=1, description="newest keyframes in the local submap")
 
 
 class LoopSection(Section):
