@@ -13,11 +13,9 @@ from hsslam.kernels.certify import certify, with_dominoes
 from hsslam.kernels.correlative import BLOCKS, SIDES, best_of_lattice, pool, posterior_mean
 from hsslam.kernels.fitness import count_hits
 from hsslam.kernels.raster import Raster
-from hsslam.kernels.refine import refine
 from hsslam.matching.interface import Reference, SearchWindow
 from hsslam.se2 import Points, Pose
 from hsslam.search.fitness import FitnessName, HitFitness, build_raster
-from hsslam.search.population import CAUCHY_SCALE, FIRST_REACH, LAST_REACH
 
 _SIDES = np.array(SIDES, dtype=np.int64)
 _BLOCKS = np.array(BLOCKS, dtype=np.int64)
@@ -164,21 +162,3 @@ def neighbourhood_mean(
         cell_turn(fitness),
         temperature * fitness.frame[3],
     )
-
-
-def polish(reference: Reference, points: Points, start: Pose, iterations: int) -> tuple[Pose, int]:
-    """Refine a pose by point-to-line Gauss-Newton, as population matchers do: the pose, iterations spent."""
-    surface = reference.surface
-    pose, spent, _ = refine(
-        surface.segments,
-        surface.lines,
-        surface.nearest,
-        surface.frame,
-        points,
-        start,
-        iterations,
-        FIRST_REACH,
-        LAST_REACH,
-        CAUCHY_SCALE,
-    )
-    return pose, spent

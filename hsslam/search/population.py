@@ -12,18 +12,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from hsslam.kernels.raster import Raster
-from hsslam.kernels.refine import refine
 from hsslam.matching.interface import Estimate, Matcher, MatcherConfig, Reference, SearchWindow, clean
 from hsslam.se2 import Points, Pose
 from hsslam.search.fitness import FitnessName, HitFitness, build_raster
-
-FIRST_REACH = 0.15
-LAST_REACH = 0.08
-"""The refinement uses points this near to the surface (m), from the first iteration to the last."""
-
-CAUCHY_SCALE = 0.03
-"""Scale of the refinement's robust weight (m)."""
-
+from hsslam.search.polish import polish
 
 NO_TRACE: NDArray[np.float64] = np.empty((0, 4))
 """Nothing is traced."""
@@ -123,19 +115,7 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
         if not self.config.refine:
             spread = plateau(points, raster.half_side)
             return Estimate(found, evaluations=evaluations, spread=spread, diagnostics=diagnostics)
-        surface = reference.surface
-        refined, iterations, _ = refine(
-            surface.segments,
-            surface.lines,
-            surface.nearest,
-            surface.frame,
-            points,
-            found,
-            self.config.refine_iterations,
-            FIRST_REACH,
-            LAST_REACH,
-            CAUCHY_SCALE,
-        )
+        refined, iterations = polish(reference, points, found, self.config.refine_iterations)
         diagnostics["refine_iterations"] = iterations
         kept = window.contains(guess, refined)
         return Estimate(refined if kept else found, evaluations=evaluations, diagnostics=diagnostics)

@@ -9,7 +9,8 @@ from pydantic import Field
 
 from hsslam.matching import Estimate, Matcher, Points, Pose, Reference, SearchWindow, clean
 from hsslam.search import PopulationConfig
-from hsslam.search.exhaustive import ExhaustiveReference, lattice_search, polish, window_search
+from hsslam.search.exhaustive import ExhaustiveReference, lattice_search, window_search
+from hsslam.search.polish import polish
 from hsslam.search.population import plateau
 
 
