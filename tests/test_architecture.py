@@ -48,6 +48,7 @@ ALLOWED = {
         "hsslam.se2",
         "hsslam.jit",
         "hsslam.errors",
+        "hsslam.validation",
     ),
     "hsslam.scan": ("hsslam.se2",),
     "hsslam.trajectory": ("hsslam.se2",),

@@ -4,6 +4,7 @@ from hsslam.search.fitness import FITNESS_NAMES, HitFitness
 from hsslam.search.genetic import genetic_search
 from hsslam.search.harmony import harmony_search
 from hsslam.search.hide import hide_search
+from hsslam.search.minimize import minimize
 from hsslam.search.population import (
     NO_TRACE,
     PopulationConfig,
@@ -21,4 +22,5 @@ __all__ = [
     "genetic_search",
     "harmony_search",
     "hide_search",
+    "minimize",
 ]
