@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
+from hsslam.kernels.growth import make_room
 from hsslam.kernels.surface import squared_distance
 from hsslam.se2 import Points
 
@@ -44,7 +45,9 @@ class Raster:
     def build(cls, segments: NDArray[np.float64], half_side: float, resolution: float) -> Raster:
         """Squares of half side ``half_side`` (m) along (S, 4) segments; equal ends make a point."""
         frame, rows, columns = _layout(segments, half_side, resolution, 1)
-        return cls(stamp_squares(segments, frame, rows, columns, half_side), frame, half_side)
+        cells = np.zeros((rows, columns), dtype=np.uint8)
+        stamp_squares(segments, frame, cells, half_side)
+        return cls(cells, frame, half_side)
 
     @classmethod
     def of_points(cls, points: Points, half_side: float, resolution: float) -> Raster:
@@ -56,7 +59,27 @@ class Raster:
         """Likelihood of a return at a distance from (S, 4) segments: a Gaussian of ``deviation`` (m)."""
         reach = FIELD_REACH * deviation
         frame, rows, columns = _layout(segments, reach, resolution, 255)
-        return cls(stamp_field(segments, frame, rows, columns, deviation, reach), frame, deviation)
+        cells = np.zeros((rows, columns), dtype=np.uint8)
+        stamp_field(segments, frame, cells, deviation, reach)
+        return cls(cells, frame, deviation)
+
+    def extended(self, segments: NDArray[np.float64]) -> Raster | None:
+        """The raster with more (S, 4) segments; takes over this one's cells. None where it would be too large."""
+        if len(segments) == 0:
+            return self
+        smooth = self.frame[3] > 1
+        reach = FIELD_REACH * self.half_side if smooth else self.half_side
+        ends = segments.reshape(-1, 2)
+        low, high = ends.min(axis=0) - reach, ends.max(axis=0) + reach
+        room = make_room(self.cells, self.frame, low, high, 0, MAXIMUM_CELLS_PER_SIDE)
+        if room is None:
+            return None
+        cells, frame = room
+        if smooth:
+            stamp_field(segments, frame, cells, self.half_side, reach)
+        else:
+            stamp_squares(segments, frame, cells, self.half_side)
+        return Raster(cells, frame, self.half_side)
 
 
 def _layout(
@@ -77,13 +100,11 @@ def _layout(
 def stamp_field(
     segments: NDArray[np.float64],
     frame: NDArray[np.float64],
-    rows: int,
-    columns: int,
+    cells: NDArray[np.uint8],
     deviation: float,
     reach: float,
-) -> NDArray[np.uint8]:
-    """Give each cell the likelihood of its centre's distance from the nearest segment, uint8 (rows, columns)."""
-    cells = np.zeros((rows, columns), dtype=np.uint8)
+) -> None:
+    """Raise each cell to the likelihood of its centre's distance from the nearest segment, in place."""
     per_metre, top = frame[2], frame[3]
     cell = 1.0 / per_metre
     for k in range(segments.shape[0]):
@@ -100,18 +121,16 @@ def stamp_field(
                     worth = np.uint8(top * math.exp(-0.5 * squared / (deviation * deviation)) + 0.5)
                     if worth > cells[row, column]:
                         cells[row, column] = worth
-    return cells
 
 
 @kernel
 def stamp_squares(
-    segments: NDArray[np.float64], frame: NDArray[np.float64], rows: int, columns: int, half_side: float
-) -> NDArray[np.uint8]:
-    """Set the cells whose centre is in a square around some place of a segment, uint8 (rows, columns).
+    segments: NDArray[np.float64], frame: NDArray[np.float64], cells: NDArray[np.uint8], half_side: float
+) -> None:
+    """Set the cells whose centre is in a square around some place of a segment to 1, in place.
 
     A segment is walked in steps of at most a cell, so the squares of its inner places overlap.
     """
-    cells = np.zeros((rows, columns), dtype=np.uint8)
     per_metre = frame[2]
     half = half_side * per_metre
     for k in range(segments.shape[0]):
@@ -128,4 +147,3 @@ def stamp_squares(
             for row in range(int(np.ceil(y - half)), int(np.floor(y + half)) + 1):
                 for column in range(left, right + 1):
                     cells[row, column] = 1
-    return cells

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
+from hsslam.kernels.growth import make_room
 from hsslam.se2 import Points
 
 GAP = 0.35
@@ -65,13 +66,31 @@ class Surface:
                 np.full((1, 1), -1, dtype=np.int32),
                 np.array([0.0, 0.0, 1.0]),
             )
-        segments, lines = join(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
-        low = points.min(axis=0) - REACH
-        extent = points.max(axis=0) + REACH - low
+        return cls._of(*join(points, GAP, FIT_SPAN, FIT_ROUGHNESS))
+
+    @classmethod
+    def _of(cls, segments: NDArray[np.float64], lines: NDArray[np.float64]) -> Surface:
+        ends = segments.reshape(-1, 2)
+        low = ends.min(axis=0) - REACH
+        extent = ends.max(axis=0) + REACH - low
         resolution = max(RESOLUTION, float(extent.max()) / MAXIMUM_CELLS_PER_SIDE)
         columns, rows = (int(v) for v in np.ceil(extent / resolution) + 1)
         frame = np.array([low[0], low[1], 1.0 / resolution])
         return cls(segments, lines, rasterise_nearest(segments, frame, rows, columns, REACH), frame)
+
+    def extended(self, points: Points) -> Surface:
+        """The surface with one more scan's (N, 2) points; takes over this one's raster, which is then void."""
+        if len(self.segments) == 0 or len(points) == 0:
+            return Surface.build(points) if len(points) else self
+        added, lines = join(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
+        segments, lines = np.vstack((self.segments, added)), np.vstack((self.lines, lines))
+        low, high = points.min(axis=0) - REACH, points.max(axis=0) + REACH
+        room = make_room(self.nearest, self.frame, low, high, -1, MAXIMUM_CELLS_PER_SIDE)
+        if room is None:
+            return Surface._of(segments, lines)
+        nearest, frame = room
+        add_nearest(segments, len(self.segments), nearest, frame, REACH)
+        return Surface(segments, lines, nearest, frame)
 
 
 @kernel
@@ -205,6 +224,39 @@ def rasterise_nearest(
                     best[row, column] = distance
                     nearest[row, column] = k
     return nearest
+
+
+@kernel
+def add_nearest(
+    segments: NDArray[np.float64],
+    first: int,
+    nearest: NDArray[np.int32],
+    frame: NDArray[np.float64],
+    reach: float,
+) -> None:
+    """Bring the segments from number ``first`` on into a raster of the earlier ones, in place.
+
+    What stands in a cell stays unless the new segment is nearer to the cell's centre.
+    """
+    rows, columns = nearest.shape
+    per_metre = frame[2]
+    cell = 1.0 / per_metre
+    for k in range(first, segments.shape[0]):
+        ax, ay, bx, by = segments[k, 0], segments[k, 1], segments[k, 2], segments[k, 3]
+        left = max(int((min(ax, bx) - reach - frame[0]) * per_metre), 0)
+        right = min(int((max(ax, bx) + reach - frame[0]) * per_metre), columns - 1)
+        bottom = max(int((min(ay, by) - reach - frame[1]) * per_metre), 0)
+        top = min(int((max(ay, by) + reach - frame[1]) * per_metre), rows - 1)
+        for row in range(bottom, top + 1):
+            y = frame[1] + (row + 0.5) * cell
+            for column in range(left, right + 1):
+                x = frame[0] + (column + 0.5) * cell
+                distance = squared_distance(segments[k], x, y)
+                if distance > reach * reach:
+                    continue
+                other = nearest[row, column]
+                if other < 0 or distance < squared_distance(segments[other], x, y):
+                    nearest[row, column] = k
 
 
 @kernel

@@ -80,15 +80,24 @@ class Reference:
     points : Points
         (N, 2) m. Neighbours in the array that are close to one another are taken for neighbours on a
         surface, so keep a scan's beams in their order; scans may follow one another.
+    surface : Surface, optional
+        Through the points, where it is known; made when it is asked for where left out.
     """
 
-    def __init__(self, points: Points) -> None:
+    def __init__(self, points: Points, surface: Surface | None = None) -> None:
         self.points = points
+        self._surface = surface
 
-    @cached_property
+    @property
     def surface(self) -> Surface:
         """Surface through the points: what `MatchResult.score` and the covariance are measured on."""
-        return Surface.build(self.points)
+        if self._surface is None:
+            self._surface = Surface.build(self.points)
+        return self._surface
+
+    def adopt(self, surface: Surface) -> None:
+        """Take a surface through the points that somebody else made."""
+        self._surface = surface
 
 
 @dataclass(frozen=True)
@@ -186,6 +195,17 @@ class Matcher(ABC, Generic[ConfigT]):
     def prepare(self, points: Points) -> Reference:
         """Make a reference of (N, 2) points; done once, used for many matches."""
         return Reference(clean(points))
+
+    def extend(self, reference: Reference, points: Points) -> Reference:
+        """Add one more scan's (N, 2) points, in the reference's frame, to what `prepare` made.
+
+        Takes the reference over: what is returned replaces it, and it must not be used any more. A submap that
+        grows scan by scan costs little this way. Made anew here; a plugin whose index can grow overrides it.
+        """
+        points = clean(points)
+        grown = self.prepare(np.vstack((reference.points, points)))
+        grown.adopt(reference.surface.extended(points))
+        return grown
 
     @abstractmethod
     def estimate(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from hsslam.kernels.raster import Raster
+from hsslam.kernels.surface import Surface
 from hsslam.matching.interface import Estimate, Matcher, MatcherConfig, Reference, SearchWindow, clean
 from hsslam.se2 import Points, Pose
 from hsslam.search.fitness import FitnessName, HitFitness, build_raster
@@ -38,15 +39,29 @@ class PopulationConfig(MatcherConfig):
 class PopulationReference(Reference):
     """A reference with the rasters that the search looks points up in."""
 
-    def __init__(self, points: Points, config: PopulationConfig) -> None:
-        super().__init__(points)
+    def __init__(
+        self,
+        points: Points,
+        config: PopulationConfig,
+        surface: Surface | None = None,
+        raster: Raster | None = None,
+    ) -> None:
+        super().__init__(points, surface)
         self._config = config
-        self.raster: Raster = self._build(1.0)
+        self.raster: Raster = raster if raster is not None else self._build(1.0)
 
     @cached_property
     def coarse(self) -> Raster:
         """Squares and cells twice as large: what a search over a wide window can see from afar."""
         return self._build(2.0)
+
+    def extended(self, points: Points) -> PopulationReference:
+        """The reference with (N, 2) more points; takes this one's rasters over."""
+        known = len(self.surface.segments)
+        surface = self.surface.extended(points)
+        added = np.hstack((points, points)) if self._config.fitness == "paper" else surface.segments[known:]
+        every = np.vstack((self.points, points))
+        return PopulationReference(every, self._config, surface, self.raster.extended(added))
 
     def _build(self, scale: float) -> Raster:
         config = self._config
@@ -78,6 +93,11 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
     def prepare(self, points: Points) -> PopulationReference:
         """Rasterise a reference; see `hsslam.matching.Matcher.prepare`."""
         return PopulationReference(clean(points), self.config)
+
+    def extend(self, reference: Reference, points: Points) -> PopulationReference:
+        """Stamp more points into the rasters; see `hsslam.matching.Matcher.extend`."""
+        assert isinstance(reference, PopulationReference)
+        return reference.extended(clean(points))
 
     def is_wide(self, window: SearchWindow) -> bool:
         """Whether to search a window on the coarse raster."""

@@ -79,6 +79,13 @@ class KissIcpReference(Reference):
         )
         self.voxels.add_points(in_space(points))
 
+    def extended(self, points: Points) -> KissIcpReference:
+        """Add (N, 2) points to this very reference."""
+        self.adopt(self.surface.extended(points))
+        self.points = np.vstack((self.points, points))
+        self.voxels.add_points(in_space(points))
+        return self
+
 
 class KissIcp(Matcher[KissIcpConfig]):
     """Point-to-point ICP on a voxel map with a Geman-McClure weight (the kiss-icp package), z = 0.
@@ -98,6 +105,11 @@ class KissIcp(Matcher[KissIcpConfig]):
     def prepare(self, points: Points) -> KissIcpReference:
         """Fill the voxel map; see `hsslam.matching.Matcher.prepare`."""
         return KissIcpReference(clean(points), self.config)
+
+    def extend(self, reference: Reference, points: Points) -> KissIcpReference:
+        """Add the points to the voxel map; see `hsslam.matching.Matcher.extend`."""
+        assert isinstance(reference, KissIcpReference)
+        return reference.extended(clean(points))
 
     def estimate(
         self,
