@@ -97,29 +97,52 @@ class TrackerSection(Section):
     recovery_score: float = Field(
         0.75, ge=0.0, le=1.0, description="below this score odometry is doubted and a wide window searched"
     )
+    fuse_odometry: bool = Field(
+        True, description="weigh the match and odometry's prediction by their covariances (a Kalman update)"
+    )
     recovery_window: WindowSection = WindowSection(half_x=0.75, half_y=0.75, half_theta_deg=60.0)
 
 
 class KeyframeSection(Section):
     """When a scan becomes a keyframe, and how many make a submap."""
 
-    distance: float = Field(0.2, gt=0.0, description="a keyframe after this much travel (m)")
+    distance: float = Field(0.3, gt=0.0, description="a keyframe after this much travel (m)")
     angle_deg: float = Field(10.0, gt=0.0, description="or after this much turning (deg)")
-    submap_size: int = Field(10, ge=1, description="newest keyframes in the local submap")
+    submap_size: int = Field(
+        30, ge=1, description="keyframes in a full local submap; half as many in a young one"
+    )
 
 
 class LoopSection(Section):
-    """Loop closure: candidates near by, matched over a wide window, verified."""
+    """Loop closure: candidates near by, matched over a window as wide as the graph is unsure, verified."""
 
     enabled: bool = Field(True, description="look for loops at all")
-    radius: float = Field(3.0, gt=0.0, description="candidates within this distance of the estimate (m)")
+    radius: float = Field(
+        3.0,
+        gt=0.0,
+        description="candidates within this distance of the estimate, and two of its standard deviations (m)",
+    )
     min_gap: int = Field(20, ge=1, description="keyframes between the two ends of a loop, at least")
-    submap_half: int = Field(4, ge=0, description="keyframes either side of the candidate in its submap")
+    submap_size: int = Field(12, ge=1, description="keyframes in the submap around a candidate")
     every: int = Field(1, ge=1, description="look for a loop at every n-th keyframe")
     candidates: int = Field(2, ge=1, description="candidates tried per keyframe, nearest first")
     window: WindowSection = WindowSection(half_x=1.0, half_y=1.0, half_theta_deg=20.0)
     min_score: float = Field(0.6, ge=0.0, le=1.0, description="share of points a loop must explain")
     max_std: float = Field(0.2, gt=0.0, description="largest standard deviation of an accepted loop (m)")
+    expected_std: float = Field(
+        0.15,
+        ge=0.0,
+        description="a loop that the graph foresees this well (m) and that is where it is foreseen needs no others",
+    )
+    agreeing: int = Field(
+        2, ge=0, description="other loops that must agree with a loop that the graph does not foresee"
+    )
+    patience: int = Field(30, ge=1, description="keyframes that such a loop waits for others to agree")
+    max_ambiguity: float = Field(
+        0.95,
+        gt=0.0,
+        description="refuse it where an answer elsewhere scores more than this share of its own score",
+    )
 
 
 class GraphSection(Section):

@@ -43,7 +43,13 @@ class KeyframeAdded:
 
 @dataclass(frozen=True)
 class LoopChecked:
-    """A loop candidate was tried: ``second`` seen from ``first`` (keyframes), accepted or why not."""
+    """A loop candidate was tried and judged: ``second`` seen from ``first`` (keyframes), accepted or why not.
+
+    ``expected_std`` (m) is how well the graph knew the two relative to one another before; ``surprise`` is the
+    match's squared Mahalanobis distance from that; ``agreeing`` counts the other loops that say the same; and
+    ``ambiguity`` is the score of the best answer elsewhere in the window over that of the answer, where it was
+    looked for. The verdict may come some keyframes after the match.
+    """
 
     first: int
     second: int
@@ -53,6 +59,11 @@ class LoopChecked:
     covariance: NDArray[np.float64]
     score: float
     evaluations: int
+    converged: bool = True
+    expected_std: float = 0.0
+    surprise: float = 0.0
+    agreeing: int = 0
+    ambiguity: float = 0.0
 
 
 @dataclass(frozen=True)

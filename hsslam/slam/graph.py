@@ -13,6 +13,7 @@ from hsslam.config import GraphSection
 from hsslam.errors import HsslamError
 from hsslam.se2 import Pose, Poses, between, compose
 from hsslam.slam.events import Edge
+from hsslam.slam.uncertainty import RelativeUncertainty
 
 PRIOR_STD = 1e-4
 """Of the first keyframe (m, rad): it defines the frame of the map."""
@@ -20,6 +21,14 @@ PRIOR_STD = 1e-4
 FLOOR_STD_XY = 0.004
 FLOOR_STD_THETA = math.radians(0.1)
 """No relative pose is trusted beyond this: errors that matches share do not show in their covariances."""
+
+
+UPDATE_EVERY = 10
+"""Loops that change next to nothing are gathered; after so many of them the estimate is brought up to date."""
+
+NEXT_TO_NOTHING_XY = 0.02
+NEXT_TO_NOTHING_THETA = math.radians(0.3)
+"""A loop that disagrees with the estimate by less than this (m, rad) changes next to nothing."""
 
 
 class GraphError(HsslamError):
@@ -43,6 +52,8 @@ class PoseGraph:
     def __init__(self, config: GraphSection, start: Pose) -> None:
         self._config = config
         self._start = start
+        self.uncertainty = RelativeUncertainty()
+        self._loops_waiting = 0
         self.edges: list[Edge] = []
         self._poses = np.empty((1024, 3))
         self._poses[0] = start
@@ -79,10 +90,15 @@ class PoseGraph:
             raise GraphError(f"a constraint names keyframes {edge.first} and {edge.second}, of {self._count}")
         self._add(edge)
 
+    @property
+    def wants_update(self) -> bool:
+        """Whether loops that came since the last `update` change the estimate enough to be worth one."""
+        return self._loops_waiting >= UPDATE_EVERY
+
     def update(self) -> None:
         """Bring the estimate up to date with iSAM2."""
+        self._loops_waiting = 0
         self._isam.update(self._new_factors, self._new_values)
-        self._isam.update()
         self._new_factors = gtsam.NonlinearFactorGraph()
         self._new_values = gtsam.Values()
         self._take(self._isam.calculateEstimate())
@@ -139,6 +155,16 @@ class PoseGraph:
 
     def _add(self, edge: Edge) -> None:
         self.edges.append(edge)
+        covariance = body_covariance(edge)
+        if edge.kind != "overlap":
+            spread = 0.5 * (covariance[0, 0] + covariance[1, 1])
+            self.uncertainty.add(edge.first, edge.second, spread, covariance[2, 2])
+        if edge.kind == "loop":
+            error = between(edge.relative, between(self._poses[edge.first], self._poses[edge.second]))
+            small = (
+                math.hypot(error[0], error[1]) < NEXT_TO_NOTHING_XY and abs(error[2]) < NEXT_TO_NOTHING_THETA
+            )
+            self._loops_waiting += 1 if small else UPDATE_EVERY
         self._new_factors.add(self._factor(edge, edge.kind != "odometry" and self._config.robust != "none"))
 
     def _factor(self, edge: Edge, robust: bool) -> Any:

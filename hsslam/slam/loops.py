@@ -1,35 +1,74 @@
-"""Loop closure: earlier keyframes near by, matched over a wide window, verified."""
+"""Loop closure: earlier keyframes near by, matched over a window as wide as the graph is unsure, verified."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import Config
-from hsslam.matching.interface import Matcher, MatchResult, Reference
-from hsslam.se2 import Points, Poses, between
+from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
+from hsslam.se2 import Points, Pose, Poses, between, compose, inverse, wrap
 from hsslam.slam.events import LoopChecked
+from hsslam.slam.fusion import rotated, squared_mahalanobis
 from hsslam.slam.randomness import Purpose, generator
+from hsslam.slam.recovery import best_elsewhere
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import merge
 from hsslam.slam.tracker import search_window
+from hsslam.slam.uncertainty import RelativeUncertainty
 
-REFERENCES_KEPT = 64
+REFERENCES_KEPT = 24
 """Prepared submaps kept for the next candidates; a robot that comes back passes several of them in a row."""
+
+SIGMAS = 3.0
+"""A window reaches this many standard deviations to either side."""
+
+LEAST_HALF_XY = 0.15
+LEAST_HALF_THETA = math.radians(5.0)
+"""No window is smaller than this (m, rad): it costs a search little, and covariances may be too small."""
+
+ELSEWHERE_XY = 0.5
+ELSEWHERE_THETA = math.radians(15.0)
+"""An answer this far from the one in question (m, rad) is another one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An earlier keyframe to match the newest one against, and how well their relative pose is known."""
+
+    first: int
+    variance_xy: float
+    variance_theta: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """A prepared submap: reference in the frame of ``origin``, a pose of the graph when it was made."""
+
+    reference: Reference
+    origin: Pose
+    first: int
+    poses: Poses
+
+    def of(self, keyframe: int) -> Pose:
+        """A keyframe of the submap in the reference's frame."""
+        return between(self.origin, self.poses[keyframe - self.first])
 
 
 class LoopCloser:
-    """Proposes and verifies constraints between the newest keyframe and earlier ones.
+    """Proposes and matches constraints between the newest keyframe and earlier ones.
 
     Parameters
     ----------
     config : Config
-        Its ``loops`` section and its seed.
+        Its ``loops`` and ``tracker`` sections and its seed.
     matcher : Matcher
-        Any; it is asked for matches over a wide window.
+        Any; it is asked for matches over windows wide and narrow.
     stopwatch : Stopwatch
         Told how long all of it took.
     """
@@ -38,10 +77,11 @@ class LoopCloser:
         self._config = config
         self._matcher = matcher
         self._stopwatch = stopwatch
-        self._window = search_window(config.loops.window)
-        self._references: dict[int, Reference] = {}
+        self._widest = search_window(config.loops.window)
+        self._tile = search_window(config.tracker.window)
+        self._places: dict[int, _Place] = {}
 
-    def candidates(self, poses: Poses) -> list[int]:
+    def candidates(self, poses: Poses, uncertainty: RelativeUncertainty) -> list[Candidate]:
         """Keyframes worth trying against the newest one, nearest first, not two of the same place."""
         rules = self._config.loops
         newest = len(poses) - 1
@@ -49,64 +89,137 @@ class LoopCloser:
             return []
         offsets = poses[: newest - rules.min_gap, :2] - poses[newest, :2]
         distances = np.hypot(offsets[:, 0], offsets[:, 1])
-        chosen: list[int] = []
-        for i in np.argsort(distances, kind="stable"):
-            if distances[i] > rules.radius or len(chosen) == rules.candidates:
+        near = np.flatnonzero(distances <= rules.radius + 2.0 * self._widest.half_x)
+        if len(near) == 0:
+            return []
+        near = near[np.argsort(distances[near], kind="stable")]
+        with self._stopwatch.measure("candidates"):
+            variances = uncertainty.seen_from(newest, near, poses)
+        chosen: list[Candidate] = []
+        for i, (xy, theta) in zip(near, variances, strict=True):
+            if len(chosen) == rules.candidates:
                 break
-            if all(abs(int(i) - j) > 2 * rules.submap_half for j in chosen):
-                chosen.append(int(i))
+            if distances[i] > rules.radius + 2.0 * min(math.sqrt(xy), self._widest.half_x):
+                continue
+            if all(abs(int(i) - other.first) > rules.submap_size for other in chosen):
+                chosen.append(Candidate(int(i), float(xy), float(theta)))
         return chosen
 
-    def check(
-        self, first: int, points: list[Points], poses: Poses, known: LoopChecked | None = None
+    def match(
+        self, candidate: Candidate, points: Sequence[Points], poses: Poses, known: LoopChecked | None = None
     ) -> LoopChecked:
-        """Match the newest keyframe against the submap around keyframe ``first`` and verify the answer.
+        """Match the newest keyframe against the submap around a candidate; the verdict is still open.
 
         ``known``, what an earlier, interrupted run found, is taken as it is. The submap is made all the same:
         later candidates use it as it was now, in a resumed run as in a whole one.
         """
-        second = len(poses) - 1
+        first, second = candidate.first, len(poses) - 1
         with self._stopwatch.measure("loops"):
-            reference = self._reference(first, points, poses)
-            if known is not None:
-                return known
+            place = self._place(first, points, poses)
             guess = between(poses[first], poses[second])
-            rng = generator(self._config.seed, Purpose.LOOP, first, second)
-            result = self._matcher.match(reference, points[second], guess, self._window, rng)
-        reason = self._refusal(result)
+            if known is None:
+                known = self._match(candidate, second, points[second], place, guess)
+        deviation = known.relative - guess
+        deviation[2] = wrap(deviation[2])
+        foreseen = np.diag([candidate.variance_xy, candidate.variance_xy, candidate.variance_theta])
+        surprise = squared_mahalanobis(deviation, foreseen + known.covariance)
         return LoopChecked(
             first=first,
             second=second,
-            accepted=not reason,
-            reason=reason,
-            relative=result.pose,
-            covariance=result.covariance,
-            score=result.score,
-            evaluations=result.evaluations,
+            accepted=False,
+            reason=self._refusal(known),
+            relative=known.relative,
+            covariance=known.covariance,
+            score=known.score,
+            evaluations=known.evaluations,
+            converged=known.converged,
+            expected_std=math.sqrt(candidate.variance_xy),
+            surprise=surprise,
         )
 
-    def _reference(self, first: int, points: list[Points], poses: Poses) -> Reference:
-        reference = self._references.pop(first, None)
-        if reference is None:
-            half = self._config.loops.submap_half
-            low, high = max(first - half, 0), min(first + half + 1, len(poses) - 1)
-            reference = self._matcher.prepare(merge(points[low:high], poses[low:high], first - low))
-        self._references[first] = reference
-        if len(self._references) > REFERENCES_KEPT:
-            del self._references[next(iter(self._references))]
-        return reference
+    def ambiguity(self, loop: LoopChecked, points: Sequence[Points], poses: Poses) -> float:
+        """Score of the best answer elsewhere in the widest window, over that of the loop's own answer."""
+        with self._stopwatch.measure("ambiguity"):
+            place = self._place(loop.first, points, poses)
+            answer = compose(place.of(loop.first), loop.relative)
+            rng = generator(self._config.seed, Purpose.AMBIGUITY, loop.first, loop.second)
+            score = best_elsewhere(
+                self._matcher,
+                place.reference,
+                points[loop.second],
+                answer,
+                self._widest,
+                self._tile,
+                (ELSEWHERE_XY, ELSEWHERE_THETA),
+                rng,
+            )
+        return score / max(loop.score, 1e-9)
 
-    def _refusal(self, result: MatchResult) -> str:
+    def _match(
+        self, candidate: Candidate, second: int, scan: Points, place: _Place, guess: Pose
+    ) -> LoopChecked:
+        first = candidate.first
+        base = place.of(first)
+        rng = generator(self._config.seed, Purpose.LOOP, first, second)
+        window = self._window(candidate)
+        result: MatchResult = self._matcher.match(place.reference, scan, compose(base, guess), window, rng)
+        return LoopChecked(
+            first=first,
+            second=second,
+            accepted=False,
+            reason="",
+            relative=compose(inverse(base), result.pose),
+            covariance=rotated(result.covariance, base[2]),
+            score=result.score,
+            evaluations=result.evaluations,
+            converged=result.converged,
+        )
+
+    def _window(self, candidate: Candidate) -> SearchWindow:
+        half_xy = max(SIGMAS * math.sqrt(candidate.variance_xy), LEAST_HALF_XY)
+        half_theta = max(SIGMAS * math.sqrt(candidate.variance_theta), LEAST_HALF_THETA)
+        widest = self._widest
+        # A few sizes only: what a matcher works out for a window is worth keeping.
+        half_xy, half_theta = (_rounded_up(half_xy), _rounded_up(half_theta))
+        return SearchWindow(
+            min(half_xy, widest.half_x), min(half_xy, widest.half_y), min(half_theta, widest.half_theta)
+        )
+
+    def _place(self, first: int, points: Sequence[Points], poses: Poses) -> _Place:
+        size = self._config.loops.submap_size
+        step = max(size // 2, 1)
+        number = first // step
+        place = self._places.pop(number, None)
+        if place is None:
+            middle = number * step + step // 2
+            low = max(middle - size // 2, 0)
+            high = min(middle + size // 2 + 1, len(poses) - 1)
+            low, high = min(low, first), max(high, first + 1)
+            origin = poses[min(middle, high - 1)].copy()
+            reference = self._matcher.prepare(merge(points[low:high], poses[low:high], origin))
+            place = _Place(reference, origin, low, poses[low:high].copy())
+        self._places[number] = place
+        if len(self._places) > REFERENCES_KEPT:
+            del self._places[next(iter(self._places))]
+        return place
+
+    def _refusal(self, loop: LoopChecked) -> str:
         rules = self._config.loops
-        if not result.converged:
-            return str(result.diagnostics.get("rejected", "the matcher did not converge"))
-        if result.score < rules.min_score:
-            return f"score {result.score:.2f} below {rules.min_score:.2f}"
-        largest = math.sqrt(_largest_variance(result.covariance))
+        if not loop.converged:
+            return "the matcher did not converge inside the window"
+        if loop.score < rules.min_score:
+            return f"score {loop.score:.2f} below {rules.min_score:.2f}"
+        largest = math.sqrt(_largest_variance(loop.covariance))
         if largest > rules.max_std:
             return f"standard deviation {largest:.2f} m above {rules.max_std:.2f} m"
         return ""
 
 
+def _rounded_up(value: float) -> float:
+    """To the next power of the square root of 2."""
+    return float(2.0 ** (math.ceil(2.0 * math.log2(value)) / 2.0))
+
+
 def _largest_variance(covariance: NDArray[np.float64]) -> float:
-    return float(np.linalg.eigvalsh(covariance[:2, :2])[-1])
+    mean = 0.5 * (covariance[0, 0] + covariance[1, 1])
+    return float(mean + math.hypot(0.5 * (covariance[0, 0] - covariance[1, 1]), covariance[0, 1]))

@@ -25,6 +25,7 @@ from hsslam.slam.loops import LoopCloser
 from hsslam.slam.overlap import match_pairs, overlapping_pairs
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.tracker import TrackedScan, Tracker
+from hsslam.slam.verification import LoopVerifier
 from hsslam.trajectory import Trajectory
 
 
@@ -52,6 +53,7 @@ class Slam:
         loop_matcher = config.loop_matcher.create() if config.loop_matcher is not None else self._matcher
         self._tracker = Tracker(config, self._matcher, self._stopwatch)
         self._closer = LoopCloser(config, loop_matcher, self._stopwatch)
+        self._verifier = LoopVerifier(config.loops, self._ambiguity)
         self._graph: PoseGraph | None = None
         self._keyframes: list[LaserScan] = []
         self._points: list[Points] = []
@@ -74,17 +76,17 @@ class Slam:
         """Take the next scan; its pose comes first, then what follows from it."""
         if self._graph is None:
             self._graph = PoseGraph(self._config.graph, scan.odometry)
-            self._tracker.add_keyframe(scan, None)
+            self._tracker.start(scan, scan.robot_points)
             first = TrackedScan(np.zeros(3), np.eye(3) * 1e-12, 1.0, True, 0)
             yield self._record(scan, 0, first)
             yield self._keep(scan)
             return
-        tracked = self._tracker.track(scan, self._known(scan.index))
+        tracked = self._tracker.track(scan, scan.robot_points, self._known(scan.index))
         newest = len(self._graph) - 1
         yield self._record(scan, newest, tracked)
         if not self._tracker.wants_keyframe(tracked):
             return
-        self._tracker.add_keyframe(scan, tracked)
+        self._tracker.add_keyframe(scan.robot_points, tracked)
         self._graph.add_keyframe(tracked.relative, tracked.covariance)
         self._anchors[-1], self._relatives[-1] = newest + 1, np.zeros(3)
         yield self._keep(scan)
@@ -99,6 +101,7 @@ class Slam:
             If there was no scan.
         """
         graph = self._require_graph()
+        yield from self._settle(self._verifier.close())
         yield self._optimise("final")
         for stage in range(self._config.graph.refine_rounds):
             with self._stopwatch.measure("final"):
@@ -140,20 +143,28 @@ class Slam:
 
     def _close_loops(self) -> Iterator[Event]:
         graph = self._require_graph()
-        closed = False
-        for first in self._closer.candidates(graph.poses):
-            second = len(graph) - 1
-            known = self._replay.loops.get((first, second))
-            checked = self._closer.check(first, self._points, graph.poses, known)
-            self._loops.append(checked)
-            self._evaluations += checked.evaluations
-            if checked.accepted:
-                graph.add_edge(Edge(first, second, checked.relative, checked.covariance, "loop"))
-                closed = True
-            yield checked
-        if closed:
+        second = len(graph) - 1
+        settled = self._verifier.expire(second)
+        for candidate in self._closer.candidates(graph.poses, graph.uncertainty):
+            known = self._replay.loops.get((candidate.first, second))
+            loop = self._closer.match(candidate, self._points, graph.poses, known)
+            self._evaluations += loop.evaluations
+            settled += self._verifier.judge(loop, graph.poses)
+        yield from self._settle(settled)
+        if graph.wants_update:
             with self._stopwatch.measure("graph"):
                 graph.update()
+
+    def _settle(self, loops: list[LoopChecked]) -> Iterator[Event]:
+        for loop in loops:
+            self._loops.append(loop)
+            if loop.accepted:
+                edge = Edge(loop.first, loop.second, loop.relative, loop.covariance, "loop")
+                self._require_graph().add_edge(edge)
+            yield loop
+
+    def _ambiguity(self, loop: LoopChecked) -> float:
+        return self._closer.ambiguity(loop, self._points, self._require_graph().poses)
 
     def _optimise(self, stage: str) -> Optimised:
         graph = self._require_graph()

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
-from hsslam.se2 import Points, Pose
+from hsslam.se2 import Points, Pose, wrap
 
 OVERLAP = 0.75
 """Distance of neighbouring tiles as a share of their size: a truth at a tile's edge is well inside the next."""
@@ -61,3 +61,43 @@ def steps_along(wide: float, tile: float) -> NDArray[np.float64]:
     count = 2 * int(np.ceil(max(wide - tile, 0.0) / (2.0 * tile * OVERLAP))) + 1
     reach = max(wide - tile, 0.0)
     return np.linspace(-reach, reach, count)
+
+
+def best_elsewhere(
+    matcher: Matcher[Any],
+    reference: Reference,
+    points: Points,
+    answer: Pose,
+    wide: SearchWindow,
+    tile: SearchWindow,
+    apart: tuple[float, float],
+    rng: np.random.Generator,
+) -> float:
+    """Score of the best match that is not the answer in question.
+
+    Parameters
+    ----------
+    matcher, reference, points, rng
+        As for `hsslam.matching.Matcher.match`.
+    answer : Pose
+        In the reference's frame.
+    wide, tile : SearchWindow
+        What is searched around the answer, and the part searched at a time.
+    apart : (float, float)
+        Distance (m) and turn (rad) at which a match is another answer.
+    """
+    best = 0.0
+    steps = (steps_along(w, t) for w, t in zip(wide.half, tile.half, strict=True))
+    for offset in product(*steps):
+        # A tile whose every place is near the answer can tell nothing else.
+        if (
+            np.hypot(offset[0], offset[1]) + tile.half_x < apart[0]
+            and abs(offset[2]) + tile.half_theta < apart[1]
+        ):
+            continue
+        result = matcher.match(reference, points, answer + np.array(offset), tile, rng)
+        away = result.pose - answer
+        far = np.hypot(away[0], away[1]) >= apart[0] or abs(wrap(away[2])) >= apart[1]
+        if result.converged and far:
+            best = max(best, result.score)
+    return best

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from hsslam.config import Config, WindowSection
 from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
 from hsslam.scan import LaserScan
-from hsslam.se2 import Points, Pose, Poses, between, compose
+from hsslam.se2 import Points, Pose, between, compose, wrap
+from hsslam.slam.fusion import fuse, rotated
+from hsslam.slam.motion import MotionModel
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.recovery import match_tiles
 from hsslam.slam.stopwatch import Stopwatch
-from hsslam.slam.submap import merge
+from hsslam.slam.submap import LocalSubmap
 
 RECOVERY_GAIN = 0.1
 """Odometry is overruled only by an answer whose score is this much higher."""
@@ -39,7 +41,7 @@ def search_window(section: WindowSection) -> SearchWindow:
 
 
 class Tracker:
-    """Knows the newest keyframes and where the last scan was seen from the newest of them.
+    """Knows the local submap and where the last scan is in it.
 
     Parameters
     ----------
@@ -56,26 +58,40 @@ class Tracker:
         self._matcher = matcher
         self._stopwatch = stopwatch
         self._window = search_window(config.tracker.window)
-        self._points: list[Points] = []
-        self._poses: list[Pose] = []
-        self._reference: Reference | None = None
-        self._last_relative: Pose = np.zeros(3)
-        self._last_odometry: Pose = np.zeros(3)
-        self._last_motion: Pose = np.zeros(3)
+        self._submap = LocalSubmap(matcher, config.keyframes.submap_size)
+        self._motion = MotionModel(config.graph)
+        self._pose: Pose = np.zeros(3)
+        self._covariance: NDArray[np.float64] = np.zeros((3, 3))
 
-    def track(self, scan: LaserScan, known: TrackedScan | None = None) -> TrackedScan:
+    def start(self, scan: LaserScan, points: Points) -> None:
+        """Begin with the first scan, the first keyframe."""
+        self._motion.start(scan)
+        self._submap.add(points, np.zeros(3))
+
+    def track(self, scan: LaserScan, points: Points, known: TrackedScan | None = None) -> TrackedScan:
         """Find a scan's pose seen from the newest keyframe.
 
         Parameters
         ----------
         scan : LaserScan
             The next scan.
+        points : Points
+            (N, 2) m, its returns in the robot's frame.
         known : TrackedScan, optional
             What an earlier, interrupted run found for it: taken as it is.
         """
-        tracked = known if known is not None else self._match(scan)
-        self._last_motion = between(self._last_relative, tracked.relative)
-        self._last_relative, self._last_odometry = tracked.relative, scan.odometry
+        moved, noise = self._motion.predict(scan)
+        noise = rotated(noise, -self._pose[2])
+        predicted, prior = compose(self._pose, moved), self._covariance + noise
+        tracked = known if known is not None else self._match(scan, points, predicted, prior)
+        newest = self._submap.newest
+        pose, posterior = compose(newest, tracked.relative), rotated(tracked.covariance, -newest[2])
+        if tracked.matched:
+            correction = pose - predicted
+            correction[2] = wrap(correction[2])
+            self._motion.learn(correction, noise, prior, posterior)
+        self._motion.observe(scan, between(self._pose, pose))
+        self._pose, self._covariance = pose, posterior
         return tracked
 
     def wants_keyframe(self, tracked: TrackedScan) -> bool:
@@ -84,54 +100,48 @@ class Tracker:
         rules = self._config.keyframes
         return math.hypot(x, y) >= rules.distance or abs(theta) >= math.radians(rules.angle_deg)
 
-    def add_keyframe(self, scan: LaserScan, tracked: TrackedScan | None) -> None:
-        """Make a scan the newest keyframe; ``tracked`` is None for the very first."""
-        pose = np.zeros(3) if tracked is None else compose(self._poses[-1], tracked.relative)
-        self._points.append(scan.robot_points)
-        self._poses.append(pose)
-        size = self._config.keyframes.submap_size
-        del self._points[:-size], self._poses[:-size]
-        self._reference = None
-        self._last_relative, self._last_odometry = np.zeros(3), scan.odometry
+    def add_keyframe(self, points: Points, tracked: TrackedScan) -> None:
+        """Make the last scan the newest keyframe."""
+        with self._stopwatch.measure("submap"):
+            self._submap.add(points, tracked.relative)
+        heading = self._pose[2]
+        self._pose = self._submap.newest
+        self._covariance = rotated(self._covariance, heading - self._pose[2])
 
-    def _match(self, scan: LaserScan) -> TrackedScan:
-        moved = between(self._last_odometry, scan.odometry)
-        predicted = compose(self._last_relative, moved)
-        if self._reference is None:
-            with self._stopwatch.measure("prepare"):
-                poses: Poses = np.array(self._poses)
-                self._reference = self._matcher.prepare(merge(self._points, poses, len(poses) - 1))
+    def _match(
+        self, scan: LaserScan, points: Points, predicted: Pose, prior: NDArray[np.float64]
+    ) -> TrackedScan:
         rules = self._config.tracker
+        reference = self._submap.reference
         rng = generator(self._config.seed, Purpose.TRACK, scan.index)
         with self._stopwatch.measure("track"):
-            result = self._matcher.match(self._reference, scan.robot_points, predicted, self._window, rng)
+            result = self._matcher.match(reference, points, predicted, self._window, rng)
         if not result.converged or result.score < rules.recovery_score:
             with self._stopwatch.measure("recover"):
-                result = self._recover(self._reference, scan, result, rng)
-        if result.converged and result.score >= rules.min_score:
-            return TrackedScan(result.pose, result.covariance, result.score, True, result.evaluations)
+                result = self._recover(reference, points, result, rng)
+        matched = result.converged and result.score >= rules.min_score
+        if not matched:
+            pose, covariance = predicted, prior
+        elif rules.fuse_odometry:
+            pose, covariance = fuse(predicted, prior, result.pose, result.covariance)
+        else:
+            pose, covariance = result.pose, result.covariance
+        newest = self._submap.newest
         return TrackedScan(
-            predicted, self._odometry_covariance(predicted), result.score, False, result.evaluations
+            between(newest, pose), rotated(covariance, newest[2]), result.score, matched, result.evaluations
         )
 
     def _recover(
-        self, reference: Reference, scan: LaserScan, first: MatchResult, rng: np.random.Generator
+        self, reference: Reference, points: Points, first: MatchResult, rng: np.random.Generator
     ) -> MatchResult:
         """Doubt odometry: try the last motion once more as the prediction, then a wide window around it."""
         rules = self._config.tracker
-        repeated = compose(self._last_relative, self._last_motion)
-        best = self._matcher.match(reference, scan.robot_points, repeated, self._window, rng)
+        repeated = compose(self._pose, self._motion.last_motion)
+        best = self._matcher.match(reference, points, repeated, self._window, rng)
         evaluations = first.evaluations + best.evaluations
         if not best.converged or best.score < rules.recovery_score:
             wide = search_window(rules.recovery_window)
-            best = match_tiles(self._matcher, reference, scan.robot_points, repeated, wide, self._window, rng)
+            best = match_tiles(self._matcher, reference, points, repeated, wide, self._window, rng)
             evaluations += best.evaluations
         better = best.converged and (not first.converged or best.score > first.score + RECOVERY_GAIN)
         return replace(best if better else first, evaluations=evaluations)
-
-    def _odometry_covariance(self, relative: Pose) -> NDArray[np.float64]:
-        graph = self._config.graph
-        travel = math.hypot(relative[0], relative[1]) + abs(relative[2])
-        xy = max(graph.odometry_std_xy * travel, 0.01)
-        theta = math.radians(max(graph.odometry_std_theta_deg * travel, 0.2))
-        return np.diag([xy * xy, xy * xy, theta * theta])

@@ -1,0 +1,103 @@
+"""Covariances of poses in the plane: turned into other frames, and weighed against each other."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam.jit import kernel
+from hsslam.se2 import Pose, wrap
+
+GATE = 16.27
+"""Chi-square of 3 degrees of freedom, 99.9 %: two estimates further apart contradict each other."""
+
+
+@kernel
+def rotated(covariance: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+    """A covariance (3, 3) of a pose, in a frame that is turned by ``angle`` (rad) against the old one."""
+    c, s = math.cos(angle), math.sin(angle)
+    xx, xy, yy = covariance[0, 0], covariance[0, 1], covariance[1, 1]
+    xt, yt = covariance[0, 2], covariance[1, 2]
+    out = np.empty((3, 3))
+    out[0, 0] = c * c * xx + 2.0 * c * s * xy + s * s * yy
+    out[1, 1] = s * s * xx - 2.0 * c * s * xy + c * c * yy
+    out[0, 1] = out[1, 0] = c * s * (yy - xx) + (c * c - s * s) * xy
+    out[0, 2] = out[2, 0] = c * xt + s * yt
+    out[1, 2] = out[2, 1] = c * yt - s * xt
+    out[2, 2] = covariance[2, 2]
+    return out
+
+
+@kernel
+def inverse3(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inverse of a symmetric positive definite (3, 3) matrix."""
+    a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
+    d, e, f = matrix[1, 1], matrix[1, 2], matrix[2, 2]
+    out = np.empty((3, 3))
+    out[0, 0] = d * f - e * e
+    out[0, 1] = out[1, 0] = c * e - b * f
+    out[0, 2] = out[2, 0] = b * e - c * d
+    out[1, 1] = a * f - c * c
+    out[1, 2] = out[2, 1] = b * c - a * e
+    out[2, 2] = a * d - b * b
+    out /= a * out[0, 0] + b * out[0, 1] + c * out[0, 2]
+    return out
+
+
+@kernel
+def squared_mahalanobis(deviation: Pose, covariance: NDArray[np.float64]) -> float:
+    """Squared length of a deviation (3,) in standard deviations."""
+    information = inverse3(covariance)
+    total = 0.0
+    for i in range(3):
+        for j in range(3):
+            total += deviation[i] * information[i, j] * deviation[j]
+    return total
+
+
+@kernel
+def fuse(
+    predicted: Pose, prior: NDArray[np.float64], matched: Pose, covariance: NDArray[np.float64]
+) -> tuple[Pose, NDArray[np.float64]]:
+    """Weigh two estimates of a pose by their covariances: a Kalman update.
+
+    Parameters
+    ----------
+    predicted, matched : Pose
+        In one frame.
+    prior, covariance : float64 (3, 3)
+        Of the one and of the other.
+
+    Returns
+    -------
+    (Pose, float64 (3, 3))
+        The weighed pose and its covariance; ``matched`` alone where the two contradict each other.
+    """
+    innovation = matched - predicted
+    innovation[2] = wrap(innovation[2])
+    information = inverse3(prior + covariance)
+    distance = 0.0
+    for i in range(3):
+        for j in range(3):
+            distance += innovation[i] * information[i, j] * innovation[j]
+    if distance > GATE:
+        return matched.copy(), covariance.copy()
+    pose = predicted.copy()
+    out = prior.copy()
+    gain = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                gain[i, j] += prior[i, k] * information[k, j]
+    for i in range(3):
+        for j in range(3):
+            pose[i] += gain[i, j] * innovation[j]
+            for k in range(3):
+                out[i, j] -= gain[i, k] * prior[k, j]
+    pose[2] = wrap(pose[2])
+    for i in range(3):
+        for j in range(i):
+            out[i, j] = out[j, i] = 0.5 * (out[i, j] + out[j, i])
+    return pose, out
