@@ -160,11 +160,14 @@ class GraphSection(Section):
         1, ge=0, description="rounds of matching overlapping keyframes again at the end"
     )
     overlap_radius: float = Field(3.0, gt=0.0, description="keyframes within this distance may overlap (m)")
-    overlap_neighbours: int = Field(8, ge=1, description="overlapping keyframes matched with each, at most")
+    overlap_neighbours: int = Field(6, ge=1, description="overlapping keyframes matched with each, at most")
     overlap_half_xy: float = Field(0.15, gt=0.0, description="half side of the window of such a match (m)")
     overlap_half_theta_deg: float = Field(5.0, gt=0.0, description="half its extent in heading (deg)")
+    rescan_keyframes: int = Field(
+        18, ge=0, description="keyframes every scan is matched against once more at the very end (0: not at all)"
+    )
     overlap_min_score: float = Field(
-        0.5, ge=0.0, le=1.0, description="share of points such a match must explain"
+        0.35, ge=0.0, le=1.0, description="share of points such a match must explain"
     )
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hsslam.config import Config
 from hsslam.errors import DataError
 from hsslam.scan import LaserScan
-from hsslam.se2 import Points, Pose, compose
+from hsslam.se2 import Points, Pose, between, compose
 from hsslam.slam.events import (
     Edge,
     Event,
@@ -23,6 +24,7 @@ from hsslam.slam.graph import PoseGraph
 from hsslam.slam.journal import Replay
 from hsslam.slam.loops import LoopCloser
 from hsslam.slam.overlap import match_pairs, overlapping_pairs
+from hsslam.slam.rescan import match_scans, smooth
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.tracker import TrackedScan, Tracker
 from hsslam.slam.verification import LoopVerifier
@@ -63,6 +65,9 @@ class Slam:
         self._anchors: list[int] = []
         self._relatives: list[Pose] = []
         self._online: list[Pose] = []
+        self._scans: list[Points] = []
+        self._motions: list[Pose] = []
+        self._noises: list[NDArray[np.float64]] = []
         self._matched = 0
         self._evaluations = 0
 
@@ -113,6 +118,18 @@ class Slam:
                 for edge in edges:
                     graph.add_edge(edge)
             yield self._optimise(f"refinement {stage + 1}")
+        if self._config.graph.rescan_keyframes:
+            with self._stopwatch.measure("rescan"):
+                self._rescan(graph)
+
+    def _rescan(self, graph: PoseGraph) -> None:
+        """Match every scan against the finished map, and hang it on its keyframe anew."""
+        anchors, relatives = np.array(self._anchors), np.array(self._relatives)
+        found, covariances, matched = match_scans(
+            self._config, self._matcher, self._points, graph.poses, self._scans, anchors, relatives
+        )
+        poses = smooth(found, covariances, matched, np.array(self._motions), np.array(self._noises))
+        self._relatives = [between(graph.poses[k], pose) for k, pose in zip(anchors, poses, strict=True)]
 
     def result(self) -> SlamResult:
         """Poses of every scan seen so far, and all that led to them.
@@ -186,6 +203,9 @@ class Slam:
         self._anchors.append(keyframe)
         self._relatives.append(tracked.relative)
         self._online.append(pose)
+        self._scans.append(scan.robot_points.astype(np.float32))
+        self._motions.append(self._tracker.motion)
+        self._noises.append(self._tracker.noise)
         self._matched += tracked.matched
         self._evaluations += tracked.evaluations
         return Tracked(

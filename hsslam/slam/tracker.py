@@ -62,6 +62,10 @@ class Tracker:
         self._motion = MotionModel(config.graph)
         self._pose: Pose = np.zeros(3)
         self._covariance: NDArray[np.float64] = np.zeros((3, 3))
+        self.motion: Pose = np.zeros(3)
+        """Motion predicted from the last scan but one to the last, in the frame of the former."""
+        self.noise: NDArray[np.float64] = np.eye(3)
+        """Its covariance (3, 3), in the frame of the last scan."""
 
     def start(self, scan: LaserScan, points: Points) -> None:
         """Begin with the first scan, the first keyframe."""
@@ -84,6 +88,7 @@ class Tracker:
         noise = rotated(noise, -self._pose[2])
         predicted, prior = compose(self._pose, moved), self._covariance + noise
         tracked = known if known is not None else self._match(scan, points, predicted, prior)
+        self.motion, self.noise = moved, rotated(noise, predicted[2])
         newest = self._submap.newest
         pose, posterior = compose(newest, tracked.relative), rotated(tracked.covariance, -newest[2])
         if tracked.matched:

@@ -1,0 +1,140 @@
+"""Last step: every scan is matched once more, against all that was seen of its place, and its way smoothed.
+
+While a run goes on a scan meets the submap of the moment; at the end there is a map, and it meets that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam.config import Config
+from hsslam.matching.interface import Matcher, SearchWindow
+from hsslam.se2 import Points, Pose, Poses, between, compose
+from hsslam.slam.fusion import rotated
+from hsslam.slam.graph import FLOOR_STD_THETA, FLOOR_STD_XY
+from hsslam.slam.randomness import Purpose, generator
+from hsslam.slam.submap import merge
+
+BLOCK = 6
+"""Keyframes in a row whose scans are matched against the same submap."""
+
+
+def surrounding(poses: Poses, first: int, last: int, radius: float, most: int) -> NDArray[np.int64]:
+    """Numbers of the keyframes that saw what keyframes ``first`` to ``last`` saw.
+
+    These themselves and the two on either side, then the nearest others within ``radius`` (m), ``most`` in all.
+    """
+    middle = poses[(first + last) // 2]
+    low, high = max(first - 2, 0), min(last + 3, len(poses))
+    own = np.arange(low, high)
+    offsets = poses - middle
+    turned = np.abs((offsets[:, 2] + math.pi) % (2 * math.pi) - math.pi)
+    cost = np.hypot(offsets[:, 0], offsets[:, 1]) + 0.5 * turned
+    cost[low:high] = np.inf
+    others = np.argsort(cost, kind="stable")[: max(most - len(own), 0)]
+    return np.sort(np.concatenate((own, others[cost[others] <= radius])))
+
+
+def match_scans(
+    config: Config,
+    matcher: Matcher[Any],
+    keyframe_points: Sequence[Points],
+    poses: Poses,
+    scans: Sequence[Points],
+    anchors: NDArray[np.int64],
+    relatives: Poses,
+) -> tuple[Poses, NDArray[np.float64], NDArray[np.bool_]]:
+    """Match every scan against the surroundings of the keyframe it hangs on.
+
+    Parameters
+    ----------
+    config : Config
+        Its ``graph`` section and its seed.
+    matcher : Matcher
+        The tracker's.
+    keyframe_points, poses : sequence, Poses
+        Of the keyframes, as optimised.
+    scans : sequence of Points
+        (N_i, 2) m of every scan, in the robot's frame.
+    anchors : int64 (S,)
+        Number of the keyframe each scan hangs on; ascending.
+    relatives : Poses
+        (S, 3) each scan seen from that keyframe.
+
+    Returns
+    -------
+    (Poses (S, 3), float64 (S, 3, 3), bool (S,))
+        Poses in the map, their covariances in the axes of the map, and which of them were matched.
+    """
+    rules = config.graph
+    window = SearchWindow(
+        rules.overlap_half_xy, rules.overlap_half_xy, math.radians(rules.overlap_half_theta_deg)
+    )
+    found = np.empty((len(scans), 3))
+    covariances = np.zeros((len(scans), 3, 3))
+    matched = np.zeros(len(scans), dtype=np.bool_)
+    for first in range(0, len(poses), BLOCK):
+        last = min(first + BLOCK, len(poses)) - 1
+        start, stop = np.searchsorted(anchors, [first, last + 1])
+        if start == stop:
+            continue
+        around = surrounding(poses, first, last, rules.overlap_radius, rules.rescan_keyframes)
+        origin: Pose = poses[(first + last) // 2].copy()
+        reference = matcher.prepare(merge([keyframe_points[k] for k in around], poses[around], origin))
+        for i in range(start, stop):
+            expected = compose(poses[anchors[i]], relatives[i])
+            guess = between(origin, expected)
+            rng = generator(config.seed, Purpose.SCAN, i)
+            result = matcher.match(reference, scans[i], guess, window, rng)
+            matched[i] = result.converged and result.score >= rules.overlap_min_score
+            found[i] = compose(origin, result.pose) if matched[i] else expected
+            covariances[i] = rotated(result.covariance, -origin[2])
+    return found, covariances, matched
+
+
+def smooth(
+    poses: Poses,
+    covariances: NDArray[np.float64],
+    matched: NDArray[np.bool_],
+    motions: Poses,
+    noises: NDArray[np.float64],
+) -> Poses:
+    """The most probable way of the robot, given where its scans were matched and how odometry says it moved.
+
+    Parameters
+    ----------
+    poses, covariances, matched : Poses (S, 3), float64 (S, 3, 3), bool (S,)
+        As `match_scans` returns them; poses that were not matched are where the iteration starts, no more.
+    motions, noises : Poses (S, 3), float64 (S, 3, 3)
+        Motion from the scan before to each scan, in the frame of the scan before, and its covariance in the
+        frame of the scan itself.
+
+    Returns
+    -------
+    Poses
+        (S, 3)
+    """
+    import gtsam
+
+    graph = gtsam.NonlinearFactorGraph()
+    values = gtsam.Values()
+    floor = np.diag([FLOOR_STD_XY**2, FLOOR_STD_XY**2, FLOOR_STD_THETA**2])
+    for i, pose in enumerate(poses):
+        here = gtsam.Pose2(*pose)
+        values.insert(i, here)
+        if matched[i] or i == 0:
+            noise = gtsam.noiseModel.Gaussian.Covariance(rotated(covariances[i], pose[2]) + floor)
+            graph.add(gtsam.PriorFactorPose2(i, here, noise))
+        if i > 0:
+            noise = gtsam.noiseModel.Gaussian.Covariance(noises[i])
+            robust = gtsam.noiseModel.Robust.Create(gtsam.noiseModel.mEstimator.Cauchy.Create(2.0), noise)
+            graph.add(gtsam.BetweenFactorPose2(i - 1, i, gtsam.Pose2(*motions[i]), robust))
+    solution = gtsam.LevenbergMarquardtOptimizer(graph, values).optimize()
+    out: Poses = gtsam.utilities.extractPose2(solution)
+    return out
+
