@@ -19,7 +19,6 @@ from hsslam.se2 import Points, Poses, between
 from hsslam.slam.events import Edge
 from hsslam.slam.randomness import Purpose, generator
 
-
 SPREAD = 3
 """Keyframes between two that are matched with the same third, at least: neighbours in time tell the same."""
 

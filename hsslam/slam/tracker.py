@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hsslam.config import Config, WindowSection
 from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
 from hsslam.scan import LaserScan
-from hsslam.se2 import Points, Pose, between, compose, wrap
+from hsslam.se2 import Points, Pose, between, compose
 from hsslam.slam.fusion import fuse, rotated
 from hsslam.slam.motion import MotionModel
 from hsslam.slam.randomness import Purpose, generator
@@ -91,10 +91,6 @@ class Tracker:
         self.motion, self.noise = moved, rotated(noise, predicted[2])
         newest = self._submap.newest
         pose, posterior = compose(newest, tracked.relative), rotated(tracked.covariance, -newest[2])
-        if tracked.matched:
-            correction = pose - predicted
-            correction[2] = wrap(correction[2])
-            self._motion.learn(correction, noise, prior, posterior)
         self._motion.observe(scan, between(self._pose, pose))
         self._pose, self._covariance = pose, posterior
         return tracked
