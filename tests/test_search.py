@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from hsslam.kernels.random import seeded
 from hsslam.matching import SearchWindow, create
 from hsslam.search import HitFitness
 from hsslam.search.genetic import decode, encode
@@ -107,30 +108,30 @@ def test_gray_codes_of_neighbours_differ_in_one_bit() -> None:
 
 
 def test_improvisation_stays_in_the_window_and_uses_the_memory() -> None:
-    rng = np.random.default_rng(1)
+    rng, state = np.random.default_rng(1), seeded(1)
     guess, half = np.array([1.0, 2.0, 0.5]), np.array([0.1, 0.2, 0.3])
     memory = guess + rng.uniform(-1, 1, (30, 3)) * half
     out = np.empty(3)
     from_memory = 0
     for _ in range(2000):
-        improvise(memory, guess, half, 0.88, 0.0, np.full(3, 5.0), rng, out)
+        improvise(memory, guess, half, 0.88, 0.0, np.full(3, 5.0), state, out)
         assert (np.abs(out - guess) <= half + 1e-12).all()
         from_memory += out[0] in memory[:, 0]
     assert from_memory / 2000 == pytest.approx(0.88, abs=0.03)
-    improvise(memory, guess, half, 1.0, 1.0, np.full(3, 100.0), rng, out)
+    improvise(memory, guess, half, 1.0, 1.0, np.full(3, 100.0), state, out)
     assert (np.abs(out - guess) <= half + 1e-12).all()
 
 
 def test_differential_step_follows_equation_12() -> None:
     """With F = 0 and every variable crossed over, the trial is x + lambda (best - x)."""
-    rng = np.random.default_rng(2)
+    rng, state = np.random.default_rng(2), seeded(2)
     guess, half = np.zeros(3), np.ones(3)
     memory = rng.uniform(-1, 1, (6, 3))
     out = np.empty(3)
-    evolve(memory, 2, 4, guess, half, 0.7, 0.0, 1.0, rng, out)
+    evolve(memory, 2, 4, guess, half, 0.7, 0.0, 1.0, state, out)
     assert out == pytest.approx(memory[2] + 0.7 * (memory[4] - memory[2]))
     for _ in range(300):
-        evolve(memory, 2, 4, guess, half, 0.0, 1.0, 1.0, rng, out)
+        evolve(memory, 2, 4, guess, half, 0.0, 1.0, 1.0, state, out)
         steps = [memory[a] - memory[b] for a in range(6) for b in range(6) if len({a, b, 2}) == 3]
         expected = [np.clip(memory[2] + step, -1.0, 1.0) for step in steps]
         assert min(np.abs(out - e).max() for e in expected) < 1e-12

@@ -8,9 +8,51 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
+from hsslam.se2 import Points
 
-CHUNK = 64
+CHUNK = 32
 """Points counted between two looks at whether the candidate can still win."""
+
+NOWHERE = 1e30
+"""Coordinate of a point that is worth nothing wherever the scan is."""
+
+
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+@kernel
+def scale(points: Points, per_metre: float) -> NDArray[np.float32]:
+    """Points in cells as `count_points` wants them, float32 (2, M).
+
+    They come in an order in which any first part of them is spread over the whole scan, so that it stands for it.
+    """
+    n = points.shape[0]
+    stride = max(round(_GOLDEN * n), 1)
+    while greatest_common_divisor(n, stride) > 1:
+        stride += 1
+    out = np.empty((2, -(-n // CHUNK) * CHUNK), dtype=np.float32)
+    k = 0
+    for i in range(n):
+        out[0, i], out[1, i] = points[k, 0] * per_metre, points[k, 1] * per_metre
+        k += stride
+        if k >= n:
+            k -= n
+    out[:, n:] = NOWHERE
+    return out
+
+
+@kernel
+def greatest_common_divisor(a: int, b: int) -> int:
+    """By Euclid."""
+    while b > 0:
+        a, b = b, a % b
+    return a
+
+
+@kernel
+def scratch() -> NDArray[np.uint32]:
+    """Memory for `count_points`, which a search makes once and not for every candidate, uint32 (CHUNK,)."""
+    return np.empty(CHUNK, dtype=np.uint32)
 
 
 @kernel
@@ -41,31 +83,66 @@ def count_hits(
     at_least : int
         Sum below which the answer is of no interest.
     """
-    rows, columns = cells.shape
-    flat = cells.reshape(rows * columns)
-    right, top = np.float32(columns - 1), np.float32(rows - 1)
+    flat = cells.reshape(cells.size)
+    return count_points(flat, cells.shape, frame, xs, ys, xs.shape[0], x, y, theta, at_least, scratch())
+
+
+@kernel
+def count_points(
+    flat: NDArray[np.uint8],
+    shape: tuple[int, int],
+    frame: NDArray[np.float64],
+    xs: NDArray[np.float32],
+    ys: NDArray[np.float32],
+    count: int,
+    x: float,
+    y: float,
+    theta: float,
+    at_least: int,
+    index: NDArray[np.uint32],
+) -> int:
+    """As `count_hits`, for the inner loop of a search.
+
+    Parameters
+    ----------
+    flat, shape : uint8 (H * W,), (int, int)
+        The cells row by row, and (H, W).
+    frame, x, y, theta, at_least
+        As for `count_hits`.
+    xs, ys : float32 (N,)
+        The scan's points, then as many at `NOWHERE` as make the last chunk whole: loops of a known length become
+        vector instructions from the first point to the last.
+    count : int
+        How many are the scan's.
+    index : uint32 (CHUNK,)
+        From `scratch`. Unsigned, so that the look-up needs no branch for indices counted from the end.
+    """
+    right, top = np.float32(shape[1] - 1), np.float32(shape[0] - 1)
     zero = np.float32(0.0)
     c, s = np.float32(math.cos(theta)), np.float32(math.sin(theta))
     tx = np.float32((x - frame[0]) * frame[2])
     ty = np.float32((y - frame[1]) * frame[2])
-    n = xs.shape[0]
-    # Unsigned, so that the look-up needs no branch for indices counted from the end.
-    index = np.empty(CHUNK, dtype=np.uint32)
-    stride = np.int32(columns)
+    stride = np.int32(shape[1])
     most = int(frame[3])
+    whole = xs.shape[0] - CHUNK
     hits = 0
     start = 0
-    while start < n:
-        stop = min(start + CHUNK, n)
-        px, py = xs[start:stop], ys[start:stop]
+    while start < count:
         # Two plain loops: the first becomes vector instructions, which the look-up in the second cannot.
-        for i in range(stop - start):
-            u = min(max(c * px[i] - s * py[i] + tx, zero), right)
-            v = min(max(s * px[i] + c * py[i] + ty, zero), top)
-            index[i] = np.int32(v) * stride + np.int32(u)
-        for i in range(stop - start):
-            hits += flat[index[i]]
-        start = stop
-        if hits + most * (n - start) < at_least:
+        if start <= whole:
+            for i in range(CHUNK):
+                px, py = xs[start + i], ys[start + i]
+                u = min(max(c * px - s * py + tx, zero), right)
+                v = min(max(s * px + c * py + ty, zero), top)
+                index[i] = np.int32(v) * stride + np.int32(u)
+            for i in range(CHUNK):
+                hits += flat[index[i]]
+        else:
+            for i in range(start, count):
+                u = min(max(c * xs[i] - s * ys[i] + tx, zero), right)
+                v = min(max(s * xs[i] + c * ys[i] + ty, zero), top)
+                hits += flat[np.uint32(np.int32(v) * stride + np.int32(u))]
+        start += CHUNK
+        if hits + most * max(count - start, 0) < at_least:
             return -1
     return hits

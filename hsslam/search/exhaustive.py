@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,7 +18,6 @@ from hsslam.search.fitness import FitnessName, HitFitness, build_raster
 
 _SIDES = np.array(SIDES, dtype=np.int64)
 _BLOCKS = np.array(BLOCKS, dtype=np.int64)
-_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +64,8 @@ class ExhaustiveReference(Reference):
         return with_dominoes(self.pooled)
 
     def fitness_of(self, points: Points) -> HitFitness:
-        """Fitness of (N, 2) points; these are reordered, so that a part of them stands for the whole."""
-        return HitFitness.of(self.raster, points[np.argsort(np.arange(len(points)) * _GOLDEN % 1.0)])
+        """Fitness of (N, 2) points."""
+        return HitFitness.of(self.raster, points)
 
 
 def lattice_search(

@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from hsslam.kernels.fitness import scale
 from hsslam.kernels.raster import Raster
 from hsslam.kernels.surface import Surface
 from hsslam.se2 import Points
@@ -24,24 +25,35 @@ class HitFitness:
     ----------
     cells, frame : arrays
         Of the reference's `Raster`.
-    xs, ys : float32 (N,)
-        The scan's points in cells.
+    scaled : float32 (2, M)
+        The scan's points in cells, as `hsslam.kernels.fitness.scale` orders and pads them.
+    count : int
+        How many there are.
     """
 
     cells: NDArray[np.uint8]
     frame: NDArray[np.float64]
-    xs: NDArray[np.float32]
-    ys: NDArray[np.float32]
+    scaled: NDArray[np.float32]
+    count: int
 
     @classmethod
     def of(cls, raster: Raster, points: Points) -> HitFitness:
         """Fitness of (N, 2) points against a raster."""
-        scaled = np.ascontiguousarray((points * raster.frame[2]).T, dtype=np.float32)
-        return cls(raster.cells, raster.frame, scaled[0], scaled[1])
+        return cls(raster.cells, raster.frame, scale(points, raster.frame[2]), len(points))
+
+    @property
+    def xs(self) -> NDArray[np.float32]:
+        """Their first coordinates, (count,)."""
+        return self.scaled[0, : self.count]
+
+    @property
+    def ys(self) -> NDArray[np.float32]:
+        """Their second coordinates, (count,)."""
+        return self.scaled[1, : self.count]
 
     def share(self, hits: int) -> float:
         """What a sum of worths is of the most there could be, in [0, 1]."""
-        return hits / float(self.frame[3] * len(self.xs))
+        return hits / float(self.frame[3] * self.count)
 
 
 def build_raster(

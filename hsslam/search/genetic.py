@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.fitness import count_hits
+from hsslam.kernels.fitness import count_points, scratch
+from hsslam.kernels.random import below, seeded, uniform
 from hsslam.se2 import Pose
 
 
@@ -34,8 +35,8 @@ def encode(value: float, bits: int, centre: float, half: float) -> int:
 def genetic_search(
     cells: NDArray[np.uint8],
     frame: NDArray[np.float64],
-    xs: NDArray[np.float32],
-    ys: NDArray[np.float32],
+    scaled: NDArray[np.float32],
+    count: int,
     guess: Pose,
     half: NDArray[np.float64],
     population_size: int,
@@ -44,7 +45,7 @@ def genetic_search(
     crossover_rate: float,
     mutation_rate: float,
     tournament: int,
-    rng: np.random.Generator,
+    seed: int,
     trace: NDArray[np.float64],
 ) -> tuple[Pose, int, int]:
     """Search the window for the pose with most hits (GLASM).
@@ -55,7 +56,7 @@ def genetic_search(
 
     Parameters
     ----------
-    cells, frame, xs, ys, guess, half, rng, trace
+    cells, frame, scaled, count, guess, half, seed, trace
         As for `hsslam.search.harmony.harmony_search`.
     population_size, generations : int
         Chromosomes, and how often they are evaluated: the budget is their product.
@@ -71,6 +72,7 @@ def genetic_search(
     (Pose, int, int)
         Best pose, its hits, and how often the fitness was evaluated.
     """
+    flat, xs, ys, index, state = cells.reshape(cells.size), scaled[0], scaled[1], scratch(), seeded(seed)
     genes = np.empty((population_size, 3), dtype=np.int64)
     children = np.empty((population_size, 3), dtype=np.int64)
     hits = np.zeros(population_size, dtype=np.int64)
@@ -78,15 +80,13 @@ def genetic_search(
     best_hits = -1
     for i in range(population_size):
         for d in range(3):
-            genes[i, d] = (
-                encode(guess[d], bits, guess[d], half[d]) if i == 0 else int(rng.random() * (1 << bits))
-            )
+            genes[i, d] = encode(guess[d], bits, guess[d], half[d]) if i == 0 else below(state, 1 << bits)
     for generation in range(generations):
         for i in range(population_size):
             x = decode(genes[i, 0], bits, guess[0], half[0])
             y = decode(genes[i, 1], bits, guess[1], half[1])
             theta = decode(genes[i, 2], bits, guess[2], half[2])
-            hits[i] = count_hits(cells, frame, xs, ys, x, y, theta, 0)
+            hits[i] = count_points(flat, cells.shape, frame, xs, ys, count, x, y, theta, 0, index)
             if hits[i] > best_hits:
                 best_hits = hits[i]
                 best_genes[:] = genes[i]
@@ -99,13 +99,13 @@ def genetic_search(
             break
         children[0] = best_genes
         for i in range(1, population_size):
-            mother = select(hits, tournament, rng)
+            mother = select(hits, tournament, state)
             children[i] = genes[mother]
-            if rng.random() < crossover_rate:
-                father = select(hits, tournament, rng)
-                cross(genes[mother], genes[father], bits, rng, children[i])
-            if rng.random() < mutation_rate:
-                bit = int(rng.random() * 3 * bits)
+            if uniform(state) < crossover_rate:
+                father = select(hits, tournament, state)
+                cross(genes[mother], genes[father], bits, state, children[i])
+            if uniform(state) < mutation_rate:
+                bit = below(state, 3 * bits)
                 children[i, bit // bits] ^= 1 << (bit % bits)
         genes, children = children, genes
     pose = np.empty(3)
@@ -115,11 +115,11 @@ def genetic_search(
 
 
 @kernel
-def select(hits: NDArray[np.int64], tournament: int, rng: np.random.Generator) -> int:
+def select(hits: NDArray[np.int64], tournament: int, state: NDArray[np.uint64]) -> int:
     """Winner of a tournament among ``tournament`` random chromosomes."""
-    winner = int(rng.random() * hits.shape[0])
+    winner = below(state, hits.shape[0])
     for _ in range(tournament - 1):
-        other = int(rng.random() * hits.shape[0])
+        other = below(state, hits.shape[0])
         if hits[other] > hits[winner]:
             winner = other
     return winner
@@ -130,11 +130,11 @@ def cross(
     mother: NDArray[np.int64],
     father: NDArray[np.int64],
     bits: int,
-    rng: np.random.Generator,
+    state: NDArray[np.uint64],
     child: NDArray[np.int64],
 ) -> None:
     """One-point crossover of the whole chromosome; into ``child`` (3,)."""
-    point = 1 + int(rng.random() * (3 * bits - 1))
+    point = 1 + below(state, 3 * bits - 1)
     for d in range(3):
         from_father = min(max(point - d * bits, 0), bits)
         low = (1 << from_father) - 1

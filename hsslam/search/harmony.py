@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.fitness import count_hits
+from hsslam.kernels.fitness import count_points, scratch
+from hsslam.kernels.random import below, seeded, uniform
 from hsslam.se2 import Pose
 
 
@@ -20,7 +19,7 @@ def improvise(
     memory_considering_rate: float,
     pitch_adjusting_rate: float,
     bandwidth: NDArray[np.float64],
-    rng: np.random.Generator,
+    state: NDArray[np.uint64],
     out: NDArray[np.float64],
 ) -> None:
     """Make a new harmony (paper, Algorithm 1 and equations 7 and 8); into ``out`` (3,).
@@ -29,13 +28,21 @@ def improvise(
     either way with probability PAR; else it is drawn from the whole window. The result is clipped to the window.
     """
     for d in range(3):
-        if rng.random() <= memory_considering_rate:
-            value = memory[int(rng.random() * memory.shape[0]), d]
-            if rng.random() <= pitch_adjusting_rate:
-                value += (2.0 * rng.random() - 1.0) * bandwidth[d]
+        if uniform(state) <= memory_considering_rate:
+            value = memory[below(state, memory.shape[0]), d]
+            if uniform(state) <= pitch_adjusting_rate:
+                value += (2.0 * uniform(state) - 1.0) * bandwidth[d]
         else:
-            value = guess[d] + (2.0 * rng.random() - 1.0) * half[d]
+            value = guess[d] + (2.0 * uniform(state) - 1.0) * half[d]
         out[d] = min(max(value, guess[d] - half[d]), guess[d] + half[d])
+
+
+@kernel
+def narrowing(
+    bandwidth_min: NDArray[np.float64], bandwidth_max: NDArray[np.float64], budget: int
+) -> NDArray[np.float64]:
+    """By what the bandwidths shrink with every evaluation (paper, equation 3, step by step), (3,)."""
+    return (bandwidth_min / bandwidth_max) ** (1.0 / budget)
 
 
 @kernel
@@ -52,21 +59,25 @@ def record(
 def fill_memory(
     cells: NDArray[np.uint8],
     frame: NDArray[np.float64],
-    xs: NDArray[np.float32],
-    ys: NDArray[np.float32],
+    scaled: NDArray[np.float32],
+    count: int,
     guess: Pose,
     half: NDArray[np.float64],
-    rng: np.random.Generator,
+    index: NDArray[np.uint32],
+    state: NDArray[np.uint64],
     memory: NDArray[np.float64],
     hits: NDArray[np.int64],
     trace: NDArray[np.float64],
 ) -> None:
     """Fill the memory: the guess itself, then harmonies uniform in the window (paper, equations 1, 5 and 6)."""
+    flat, xs, ys = cells.reshape(cells.size), scaled[0], scaled[1]
     for i in range(memory.shape[0]):
         for d in range(3):
-            offset = 0.0 if i == 0 else (2.0 * rng.random() - 1.0) * half[d]
+            offset = 0.0 if i == 0 else (2.0 * uniform(state) - 1.0) * half[d]
             memory[i, d] = guess[d] + offset
-        hits[i] = count_hits(cells, frame, xs, ys, memory[i, 0], memory[i, 1], memory[i, 2], 0)
+        hits[i] = count_points(
+            flat, cells.shape, frame, xs, ys, count, memory[i, 0], memory[i, 1], memory[i, 2], 0, index
+        )
         if i < trace.shape[0]:
             record(trace, i, memory, hits[: i + 1])
 
@@ -75,8 +86,8 @@ def fill_memory(
 def harmony_search(
     cells: NDArray[np.uint8],
     frame: NDArray[np.float64],
-    xs: NDArray[np.float32],
-    ys: NDArray[np.float32],
+    scaled: NDArray[np.float32],
+    count: int,
     guess: Pose,
     half: NDArray[np.float64],
     memory_size: int,
@@ -86,14 +97,14 @@ def harmony_search(
     bandwidth_max: NDArray[np.float64],
     improvisations: int,
     patience: int,
-    rng: np.random.Generator,
+    seed: int,
     trace: NDArray[np.float64],
 ) -> tuple[Pose, int, int]:
     """Search the window for the pose with most hits (paper: HSL).
 
     Parameters
     ----------
-    cells, frame, xs, ys : arrays
+    cells, frame, scaled, count
         Of a `HitFitness`.
     guess : Pose
         Centre of the window and first harmony.
@@ -112,8 +123,8 @@ def harmony_search(
     patience : int
         The search ends after this many improvisations in a row that did not enter the memory, whose average
         fitness then has not changed (paper, section 4.4); 0 to use up NI in any case.
-    rng : numpy.random.Generator
-        Source of every random choice.
+    seed : int
+        Of every random choice; at least 0.
     trace : float64 (E, 4)
         Filled with the best pose and its hits after each of the first E evaluations; E may be 0.
 
@@ -122,28 +133,29 @@ def harmony_search(
     (Pose, int, int)
         Best harmony, its hits, and how often the fitness was evaluated.
     """
+    flat, xs, ys, index, state = cells.reshape(cells.size), scaled[0], scaled[1], scratch(), seeded(seed)
     memory = np.empty((memory_size, 3))
     hits = np.empty(memory_size, dtype=np.int64)
-    fill_memory(cells, frame, xs, ys, guess, half, rng, memory, hits, trace)
+    fill_memory(cells, frame, scaled, count, guess, half, index, state, memory, hits, trace)
     candidate = np.empty(3)
-    bandwidth = np.empty(3)
+    bandwidth, shrink = bandwidth_max.copy(), narrowing(bandwidth_min, bandwidth_max, improvisations)
     worst = int(np.argmin(hits))
     par_min, par_max = pitch_adjusting_rates
     idle = spent = 0
     for t in range(improvisations):
         if 0 < patience <= idle:
             break
-        share = t / improvisations
-        for d in range(3):
-            bandwidth[d] = bandwidth_max[d] * math.exp(math.log(bandwidth_min[d] / bandwidth_max[d]) * share)
-        rate = par_min + (par_max - par_min) * share
-        improvise(memory, guess, half, memory_considering_rate, rate, bandwidth, rng, candidate)
-        found = count_hits(cells, frame, xs, ys, candidate[0], candidate[1], candidate[2], hits[worst] + 1)
+        rate = par_min + (par_max - par_min) * t / improvisations
+        improvise(memory, guess, half, memory_considering_rate, rate, bandwidth, state, candidate)
+        x, y, theta = candidate
+        found = count_points(flat, cells.shape, frame, xs, ys, count, x, y, theta, hits[worst] + 1, index)
         if found > hits[worst]:
             memory[worst] = candidate
             hits[worst] = found
             worst = int(np.argmin(hits))
             idle = 0
+        for d in range(3):
+            bandwidth[d] *= shrink[d]
         spent += 1
         idle += 1
         if memory_size + t < trace.shape[0]:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.fitness import count_hits
+from hsslam.kernels.fitness import count_points, scratch
+from hsslam.kernels.random import below, seeded, uniform
 from hsslam.se2 import Pose
-from hsslam.search.harmony import fill_memory, improvise, record
+from hsslam.search.harmony import fill_memory, improvise, narrowing, record
 
 
 @kernel
@@ -23,7 +22,7 @@ def evolve(
     attraction: float,
     weight: float,
     crossover_rate: float,
-    rng: np.random.Generator,
+    state: NDArray[np.uint64],
     out: NDArray[np.float64],
 ) -> None:
     """Make the trial vector of one member (paper, equation 12: DE/rand-to-best/1); into ``out`` (3,).
@@ -32,18 +31,18 @@ def evolve(
     binomial crossover with ``x``: at least one variable is the mutant's. Clipped to the window.
     """
     size = memory.shape[0]
-    first = int(rng.random() * (size - 1))
+    first = below(state, size - 1)
     if first >= target:
         first += 1
-    second = int(rng.random() * (size - 2))
+    second = below(state, size - 2)
     if second >= min(first, target):
         second += 1
     if second >= max(first, target):
         second += 1
-    forced = int(rng.random() * 3)
+    forced = below(state, 3)
     for d in range(3):
         value = memory[target, d]
-        if d == forced or rng.random() < crossover_rate:
+        if d == forced or uniform(state) < crossover_rate:
             value += attraction * (memory[best, d] - value) + weight * (memory[first, d] - memory[second, d])
         out[d] = min(max(value, guess[d] - half[d]), guess[d] + half[d])
 
@@ -52,8 +51,8 @@ def evolve(
 def hide_search(
     cells: NDArray[np.uint8],
     frame: NDArray[np.float64],
-    xs: NDArray[np.float32],
-    ys: NDArray[np.float32],
+    scaled: NDArray[np.float32],
+    count: int,
     guess: Pose,
     half: NDArray[np.float64],
     memory_size: int,
@@ -67,7 +66,7 @@ def hide_search(
     weight: float,
     crossover_rate: float,
     patience: int,
-    rng: np.random.Generator,
+    seed: int,
     trace: NDArray[np.float64],
 ) -> tuple[Pose, int, int]:
     """Search the window for the pose with most hits (paper: HIDE, Fig. 5).
@@ -77,8 +76,8 @@ def hide_search(
 
     Parameters
     ----------
-    cells, frame, xs, ys, guess, half, memory_size, memory_considering_rate, pitch_adjusting_rates, \
-bandwidth_min, bandwidth_max, patience, rng, trace
+    cells, frame, scaled, count, guess, half, memory_size, memory_considering_rate, pitch_adjusting_rates, \
+bandwidth_min, bandwidth_max, patience, seed, trace
         As for `hsslam.search.harmony.harmony_search`.
     budget : int
         NFE: evaluations after the memory was filled.
@@ -96,26 +95,24 @@ bandwidth_min, bandwidth_max, patience, rng, trace
     (Pose, int, int)
         Best harmony, its hits, and how often the fitness was evaluated, the memory's filling included.
     """
+    flat, xs, ys, index, state = cells.reshape(cells.size), scaled[0], scaled[1], scratch(), seeded(seed)
     memory = np.empty((memory_size, 3))
     hits = np.empty(memory_size, dtype=np.int64)
-    fill_memory(cells, frame, xs, ys, guess, half, rng, memory, hits, trace)
+    fill_memory(cells, frame, scaled, count, guess, half, index, state, memory, hits, trace)
     candidate = np.empty(3)
-    bandwidth = np.empty(3)
+    shrink = narrowing(bandwidth_min, bandwidth_max, budget)
     par_min, par_max = pitch_adjusting_rates
     idle = spent = 0
     while spent < budget and not 0 < patience <= idle:
         worst = int(np.argmin(hits))
+        bandwidth = bandwidth_max * shrink**spent
         for _ in range(min(harmony_run, budget - spent)):
-            share = spent / budget
+            rate = par_min + (par_max - par_min) * spent / budget
+            improvise(memory, guess, half, memory_considering_rate, rate, bandwidth, state, candidate)
+            x, y, theta = candidate
+            found = count_points(flat, cells.shape, frame, xs, ys, count, x, y, theta, hits[worst] + 1, index)
             for d in range(3):
-                bandwidth[d] = bandwidth_max[d] * math.exp(
-                    math.log(bandwidth_min[d] / bandwidth_max[d]) * share
-                )
-            rate = par_min + (par_max - par_min) * share
-            improvise(memory, guess, half, memory_considering_rate, rate, bandwidth, rng, candidate)
-            found = count_hits(
-                cells, frame, xs, ys, candidate[0], candidate[1], candidate[2], hits[worst] + 1
-            )
+                bandwidth[d] *= shrink[d]
             spent += 1
             idle += 1
             if found > hits[worst]:
@@ -127,9 +124,10 @@ bandwidth_min, bandwidth_max, patience, rng, trace
                 record(trace, memory_size + spent - 1, memory, hits)
         best = int(np.argmax(hits))
         for target in range(min(memory_size, budget - spent)):
-            evolve(memory, target, best, guess, half, attraction, weight, crossover_rate, rng, candidate)
-            found = count_hits(
-                cells, frame, xs, ys, candidate[0], candidate[1], candidate[2], hits[target] + 1
+            evolve(memory, target, best, guess, half, attraction, weight, crossover_rate, state, candidate)
+            x, y, theta = candidate
+            found = count_points(
+                flat, cells.shape, frame, xs, ys, count, x, y, theta, hits[target] + 1, index
             )
             spent += 1
             idle += 1

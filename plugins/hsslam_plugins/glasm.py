@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from hsslam.kernels.random import seed_of
 from hsslam.matching import Pose, SearchWindow
 from hsslam.search import NO_TRACE, HitFitness, PopulationConfig, PopulationMatcher, genetic_search
 from hsslam.search.fitness import FitnessName
@@ -52,8 +53,8 @@ class Glasm(PopulationMatcher[GlasmConfig]):
         return genetic_search(
             fitness.cells,
             fitness.frame,
-            fitness.xs,
-            fitness.ys,
+            fitness.scaled,
+            fitness.count,
             guess,
             window.half,
             config.population_size,
@@ -62,6 +63,6 @@ class Glasm(PopulationMatcher[GlasmConfig]):
             config.crossover_rate,
             config.mutation_rate,
             config.tournament,
-            rng,
+            seed_of(rng),
             trace,
         )

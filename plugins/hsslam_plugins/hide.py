@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from hsslam.kernels.random import seed_of
 from hsslam.matching import Pose, SearchWindow
 from hsslam.search import NO_TRACE, HitFitness, hide_search
 from hsslam_plugins.harmony import HarmonyConfig, HarmonyMatcher
@@ -51,8 +52,8 @@ class Hide(HarmonyMatcher[HideConfig]):
         return hide_search(
             fitness.cells,
             fitness.frame,
-            fitness.xs,
-            fitness.ys,
+            fitness.scaled,
+            fitness.count,
             guess,
             window.half,
             scaled.memory_size,
@@ -66,6 +67,6 @@ class Hide(HarmonyMatcher[HideConfig]):
             WIDE_WEIGHT if scaled.wide else config.weight,
             config.crossover_rate,
             config.patience,
-            rng,
+            seed_of(rng),
             trace,
         )

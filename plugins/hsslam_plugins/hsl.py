@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from hsslam.kernels.random import seed_of
 from hsslam.matching import Pose, SearchWindow
 from hsslam.search import NO_TRACE, HitFitness, harmony_search
 from hsslam_plugins.harmony import HarmonyConfig, HarmonyMatcher
@@ -42,8 +43,8 @@ class Hsl(HarmonyMatcher[HslConfig]):
         return harmony_search(
             fitness.cells,
             fitness.frame,
-            fitness.xs,
-            fitness.ys,
+            fitness.scaled,
+            fitness.count,
             guess,
             window.half,
             scaled.memory_size,
@@ -53,6 +54,6 @@ class Hsl(HarmonyMatcher[HslConfig]):
             scaled.bandwidth_max,
             scaled.budget,
             config.patience,
-            rng,
+            seed_of(rng),
             trace,
         )
