@@ -17,7 +17,7 @@ def test_words_are_those_of_splitmix64() -> None:
 def test_uniform_numbers_fill_the_unit_interval_evenly() -> None:
     state = seeded(seed_of(np.random.default_rng(0)))
     drawn = np.array([uniform(state) for _ in range(20_000)])
-    assert 0.0 <= drawn.min() and drawn.max() < 1.0
+    assert drawn.min() >= 0.0 and drawn.max() < 1.0
     assert np.histogram(drawn, bins=20, range=(0.0, 1.0))[0] == pytest.approx(1000, abs=150)
     assert abs(np.corrcoef(drawn[:-1], drawn[1:])[0, 1]) < 0.03
 

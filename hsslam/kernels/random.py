@@ -36,7 +36,8 @@ def next_word(state: NDArray[np.uint64]) -> np.uint64:
     word = state[0]
     word = (word ^ (word >> _30)) * _FIRST
     word = (word ^ (word >> _27)) * _SECOND
-    return word ^ (word >> _31)
+    mixed: np.uint64 = word ^ (word >> _31)
+    return mixed
 
 
 @kernel

@@ -1,5 +1,6 @@
 """Population searches over a box around a guess: harmony search, differential evolution, HIDE, genetic."""
 
+from hsslam.kernels.random import seed_of
 from hsslam.search.fitness import FITNESS_NAMES, HitFitness
 from hsslam.search.genetic import genetic_search
 from hsslam.search.harmony import harmony_search
@@ -23,4 +24,5 @@ __all__ = [
     "harmony_search",
     "hide_search",
     "minimize",
+    "seed_of",
 ]

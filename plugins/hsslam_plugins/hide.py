@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from hsslam.kernels.random import seed_of
 from hsslam.matching import Pose, SearchWindow
-from hsslam.search import NO_TRACE, HitFitness, hide_search
+from hsslam.search import NO_TRACE, HitFitness, hide_search, seed_of
 from hsslam_plugins.harmony import HarmonyConfig, HarmonyMatcher
 
 WIDE_WEIGHT = 0.8
