@@ -150,9 +150,7 @@ def test_refinement_returns_to_the_truth(x: float, y: float, theta: float) -> No
     )
     s = Surface.build(reference)
     start = truth + [x, y, theta]
-    found, _, converged = refine(
-        s.segments, s.lines, s.nearest, s.frame, inverse_points, start, 30, 0.15, 0.08, 0.03
-    )
+    found, _, converged = refine(s.pieces, s.nearest, s.frame, inverse_points, start, 30, 0.15, 0.08, 0.03)
     assert converged
     assert found == pytest.approx(truth, abs=2e-3)
 
@@ -179,3 +177,23 @@ def test_a_plain_wall_leaves_its_own_direction_open_and_a_corner_none() -> None:
     points = corner()
     _, covariance = assess(Surface.build(points), points, np.zeros(3), WINDOW, 0.1)
     assert np.isnan(degenerate_direction(covariance, WINDOW))
+
+
+@given(clouds, st.floats(0.02, 0.2))
+@settings(deadline=None, max_examples=30)
+def test_squares_along_segments_are_those_around_their_places(
+    points: NDArray[np.float64], half_side: float
+) -> None:
+    segments = Surface.build(points).segments
+    raster = Raster.build(segments, half_side, 0.025)
+    rows, columns = np.indices(raster.cells.shape).reshape(2, -1)
+    centres = raster.frame[:2] + (np.column_stack((columns, rows)) + 0.5) / raster.frame[2]
+    shares = np.linspace(0.0, 1.0, 201)
+    gap = np.full(len(centres), np.inf)
+    for a, b in zip(segments[:, :2], segments[:, 2:], strict=True):
+        places = a + shares[:, None] * (b - a) if (a != b).any() else a[None]
+        near = np.flatnonzero((np.abs(centres - 0.5 * (a + b)) <= 0.2 + half_side).all(axis=1))
+        distance = np.abs(centres[near, None] - places[None]).max(axis=-1).min(axis=1)
+        gap[near] = np.minimum(gap[near], distance)
+    clear = np.abs(gap - half_side) > 0.002
+    assert (raster.cells.ravel()[clear] == (gap < half_side)[clear]).all()

@@ -47,9 +47,7 @@ def assess(
         Inverse of the information that the matched points hold about the pose across their lines (the
         Gauss-Newton Hessian of point-to-line distances over their variance), plus that of the window.
     """
-    matched, information = gather(
-        surface.segments, surface.lines, surface.nearest, surface.frame, points, pose, distance
-    )
+    matched, information = gather(surface.pieces, surface.nearest, surface.frame, points, pose, distance)
     return matched / max(len(points), 1), covariance_of(information, half)
 
 
@@ -93,35 +91,37 @@ def degenerate_direction(covariance: NDArray[np.float64], half: NDArray[np.float
 
 @kernel
 def gather(
-    segments: NDArray[np.float64],
-    lines: NDArray[np.float64],
-    nearest: NDArray[np.int32],
+    pieces: NDArray[np.float64],
+    nearest: NDArray[np.uint32],
     frame: NDArray[np.float64],
     points: Points,
     pose: Pose,
     distance: float,
 ) -> tuple[int, NDArray[np.float64]]:
     """Count the points within ``distance`` of the surface, and sum their information (3, 3)."""
-    information = np.zeros((3, 3))
     c, s = math.cos(pose[2]), math.sin(pose[2])
+    x0, y0 = pose[0], pose[1]
     matched = 0
-    squared_residuals = 0.0
-    gradient = np.empty(3)
+    squared_residuals = xx = xy = xt = yy = yt = tt = 0.0
     for i in range(points.shape[0]):
         rx = c * points[i, 0] - s * points[i, 1]
         ry = s * points[i, 0] + c * points[i, 1]
-        x, y = pose[0] + rx, pose[1] + ry
+        x, y = x0 + rx, y0 + ry
         k = nearest_segment(nearest, frame, x, y)
-        if k < 0 or squared_distance(segments[k], x, y) > distance * distance:
+        if k < 0 or squared_distance(pieces, k, x, y) > distance * distance:
             continue
         matched += 1
-        nx, ny = lines[k, 2], lines[k, 3]
-        residual = nx * (x - lines[k, 0]) + ny * (y - lines[k, 1])
+        nx, ny = pieces[k, 5], pieces[k, 6]
+        residual = nx * x + ny * y - pieces[k, 7]
         squared_residuals += min(residual * residual, distance * distance)
-        gradient[0], gradient[1], gradient[2] = nx, ny, ny * rx - nx * ry
-        for a in range(3):
-            for b in range(3):
-                information[a, b] += gradient[a] * gradient[b]
+        nt = ny * rx - nx * ry
+        xx += nx * nx
+        xy += nx * ny
+        xt += nx * nt
+        yy += ny * ny
+        yt += ny * nt
+        tt += nt * nt
+    information = np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
     if matched > 0:
         variance = max(squared_residuals / matched, RANGE_STD * RANGE_STD)
         information /= variance * CORRELATION

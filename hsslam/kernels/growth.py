@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 MARGIN = 4.0
 """A raster that has to grow does so by this much more than is needed (m), so that it seldom has to."""
 
-CellT = TypeVar("CellT", np.uint8, np.int32)
+CellT = TypeVar("CellT", np.uint8, np.uint32)
 
 
 def make_room(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hsslam.jit import kernel
 from hsslam.kernels.growth import make_room
-from hsslam.kernels.surface import squared_distance
+from hsslam.kernels.surface import bounds
 from hsslam.se2 import Points
 
 MAXIMUM_CELLS_PER_SIDE = 4000
@@ -44,23 +44,18 @@ class Raster:
     @classmethod
     def build(cls, segments: NDArray[np.float64], half_side: float, resolution: float) -> Raster:
         """Squares of half side ``half_side`` (m) along (S, 4) segments; equal ends make a point."""
-        frame, rows, columns = _layout(segments, half_side, resolution, 1)
-        cells = np.zeros((rows, columns), dtype=np.uint8)
-        stamp_squares(segments, frame, cells, half_side)
-        return cls(cells, frame, half_side)
+        return cls(*rasterise_squares(segments, half_side, resolution), half_side)
 
     @classmethod
     def of_points(cls, points: Points, half_side: float, resolution: float) -> Raster:
         """Squares around (N, 2) points."""
-        return cls.build(np.hstack((points, points)), half_side, resolution)
+        return cls.build(np.concatenate((points, points), axis=1), half_side, resolution)
 
     @classmethod
     def smooth(cls, segments: NDArray[np.float64], deviation: float, resolution: float) -> Raster:
         """Likelihood of a return at a distance from (S, 4) segments: a Gaussian of ``deviation`` (m)."""
-        reach = FIELD_REACH * deviation
-        frame, rows, columns = _layout(segments, reach, resolution, 255)
-        cells = np.zeros((rows, columns), dtype=np.uint8)
-        stamp_field(segments, frame, cells, deviation, reach)
+        cells, frame = blank(segments, FIELD_REACH * deviation, resolution, 255.0)
+        stamp_field(segments, frame, cells, deviation, FIELD_REACH * deviation)
         return cls(cells, frame, deviation)
 
     def extended(self, segments: NDArray[np.float64]) -> Raster | None:
@@ -69,8 +64,8 @@ class Raster:
             return self
         smooth = self.frame[3] > 1
         reach = FIELD_REACH * self.half_side if smooth else self.half_side
-        ends = segments.reshape(-1, 2)
-        low, high = ends.min(axis=0) - reach, ends.max(axis=0) + reach
+        left, bottom, right, top = bounds(segments)
+        low, high = np.array([left, bottom]) - reach, np.array([right, top]) + reach
         room = make_room(self.cells, self.frame, low, high, 0, MAXIMUM_CELLS_PER_SIDE)
         if room is None:
             return None
@@ -82,18 +77,17 @@ class Raster:
         return Raster(cells, frame, self.half_side)
 
 
-def _layout(
-    segments: NDArray[np.float64], reach: float, resolution: float, top: int
-) -> tuple[NDArray[np.float64], int, int]:
-    """Frame, rows and columns of a raster that holds ``reach`` (m) around segments, and a border."""
-    if len(segments) == 0:
-        return np.array([0.0, 0.0, 1.0, top]), 3, 3
-    ends = segments.reshape(-1, 2)
-    extent = ends.max(axis=0) - ends.min(axis=0) + 2.0 * reach
-    resolution = max(resolution, float(extent.max()) / MAXIMUM_CELLS_PER_SIDE)
-    low = ends.min(axis=0) - reach - 1.5 * resolution
-    columns, rows = (int(v) for v in np.ceil(extent / resolution) + 4)
-    return np.array([low[0], low[1], 1.0 / resolution, top]), rows, columns
+@kernel
+def blank(
+    segments: NDArray[np.float64], reach: float, resolution: float, top: float
+) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Cells, all zero, and frame of a raster that holds ``reach`` (m) around segments, and a border."""
+    left, bottom, right, above = bounds(segments)
+    width, height = right - left + 2.0 * reach, above - bottom + 2.0 * reach
+    cell = max(resolution, max(width, height) / MAXIMUM_CELLS_PER_SIDE)
+    columns, rows = math.ceil(width / cell) + 4, math.ceil(height / cell) + 4
+    frame = np.array([left - reach - 1.5 * cell, bottom - reach - 1.5 * cell, 1.0 / cell, top])
+    return np.zeros((rows, columns), dtype=np.uint8), frame
 
 
 @kernel
@@ -109,18 +103,30 @@ def stamp_field(
     cell = 1.0 / per_metre
     for k in range(segments.shape[0]):
         ax, ay, bx, by = segments[k, 0], segments[k, 1], segments[k, 2], segments[k, 3]
+        dx, dy = bx - ax, by - ay
+        length = dx * dx + dy * dy
         left = int((min(ax, bx) - reach - frame[0]) * per_metre)
         right = int((max(ax, bx) + reach - frame[0]) * per_metre)
         bottom = int((min(ay, by) - reach - frame[1]) * per_metre)
         above = int((max(ay, by) + reach - frame[1]) * per_metre)
         for row in range(bottom, above + 1):
             for column in range(left, right + 1):
-                x, y = frame[0] + (column + 0.5) * cell, frame[1] + (row + 0.5) * cell
-                squared = squared_distance(segments[k], x, y)
+                px, py = frame[0] + (column + 0.5) * cell - ax, frame[1] + (row + 0.5) * cell - ay
+                t = min(max((px * dx + py * dy) / length, 0.0), 1.0) if length > 0.0 else 0.0
+                squared = (px - t * dx) ** 2 + (py - t * dy) ** 2
                 if squared <= reach * reach:
                     worth = np.uint8(top * math.exp(-0.5 * squared / (deviation * deviation)) + 0.5)
-                    if worth > cells[row, column]:
-                        cells[row, column] = worth
+                    cells[row, column] = max(cells[row, column], worth)
+
+
+@kernel
+def rasterise_squares(
+    segments: NDArray[np.float64], half_side: float, resolution: float
+) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Cells and frame of a raster of squares."""
+    cells, frame = blank(segments, half_side, resolution, 1.0)
+    stamp_squares(segments, frame, cells, half_side)
+    return cells, frame
 
 
 @kernel
@@ -129,21 +135,26 @@ def stamp_squares(
 ) -> None:
     """Set the cells whose centre is in a square around some place of a segment to 1, in place.
 
-    A segment is walked in steps of at most a cell, so the squares of its inner places overlap.
+    In a row of cells these form one run: the columns of the places of the segment that are within half a side
+    of the row, and half a side more at each end.
     """
-    per_metre = frame[2]
-    half = half_side * per_metre
+    columns = cells.shape[1]
+    flat = cells.reshape(cells.size)
+    half = half_side * frame[2]
     for k in range(segments.shape[0]):
-        # In cells, shifted so that a cell's centre has a whole number.
-        ax = (segments[k, 0] - frame[0]) * per_metre - 0.5
-        ay = (segments[k, 1] - frame[1]) * per_metre - 0.5
-        dx = (segments[k, 2] - segments[k, 0]) * per_metre
-        dy = (segments[k, 3] - segments[k, 1]) * per_metre
-        steps = int(np.ceil(max(abs(dx), abs(dy))))
-        for step in range(steps + 1):
-            t = step / steps if steps > 0 else 0.0
-            x, y = ax + t * dx, ay + t * dy
-            left, right = int(np.ceil(x - half)), int(np.floor(x + half))
-            for row in range(int(np.ceil(y - half)), int(np.floor(y + half)) + 1):
-                for column in range(left, right + 1):
-                    cells[row, column] = 1
+        # In cells, shifted so that a cell's centre has a whole number; from the lower end to the upper.
+        ax, ay = (segments[k, 0] - frame[0]) * frame[2] - 0.5, (segments[k, 1] - frame[1]) * frame[2] - 0.5
+        bx, by = (segments[k, 2] - frame[0]) * frame[2] - 0.5, (segments[k, 3] - frame[1]) * frame[2] - 0.5
+        if ay > by:
+            ax, ay, bx, by = bx, by, ax, ay
+        slope = (bx - ax) / (by - ay) if by - ay > 1e-9 else 0.0
+        low, high = min(ax, bx), max(ax, bx)
+        for row in range(math.ceil(ay - half), math.floor(by + half) + 1):
+            first, last = low, high
+            if slope != 0.0:
+                # Where the segment enters and leaves the strip of half a side above and below the row.
+                enters, leaves = ax + slope * (row - half - ay), ax + slope * (row + half - ay)
+                first, last = max(low, min(enters, leaves)), min(high, max(enters, leaves))
+            start = np.uint64(row * columns + math.ceil(first - half))
+            for column in range(math.floor(last + half) - math.ceil(first - half) + 1):
+                flat[start + np.uint64(column)] = 1

@@ -14,9 +14,8 @@ from hsslam.se2 import Points, Pose, wrap
 
 @kernel
 def refine(
-    segments: NDArray[np.float64],
-    lines: NDArray[np.float64],
-    nearest: NDArray[np.int32],
+    pieces: NDArray[np.float64],
+    nearest: NDArray[np.uint32],
     frame: NDArray[np.float64],
     points: Points,
     start: Pose,
@@ -29,7 +28,7 @@ def refine(
 
     Parameters
     ----------
-    segments, lines, nearest, frame : arrays
+    pieces, nearest, frame : arrays
         Of a `Surface`.
     points : Points
         (N, 2) m.
@@ -51,41 +50,43 @@ def refine(
     hessian = np.empty((3, 3))
     right = np.empty(3)
     step = np.empty(3)
+    squared_scale = scale * scale
     for iteration in range(iterations):
-        hessian[:] = 0.0
-        right[:] = 0.0
         share = iteration / max(iterations - 1, 1)
         distance = max(distance_end, distance_start * (1.0 - 2.0 * share))
         c, s = math.cos(pose[2]), math.sin(pose[2])
+        x0, y0 = pose[0], pose[1]
+        xx = xy = xt = yy = yt = tt = gx = gy = gt = 0.0
         used = 0
         for i in range(points.shape[0]):
             rx = c * points[i, 0] - s * points[i, 1]
             ry = s * points[i, 0] + c * points[i, 1]
-            x, y = pose[0] + rx, pose[1] + ry
+            x, y = x0 + rx, y0 + ry
             k = nearest_segment(nearest, frame, x, y)
-            if k < 0 or squared_distance(segments[k], x, y) > distance * distance:
+            if k < 0 or squared_distance(pieces, k, x, y) > distance * distance:
                 continue
-            nx, ny = lines[k, 2], lines[k, 3]
-            residual = nx * (x - lines[k, 0]) + ny * (y - lines[k, 1])
-            weight = 1.0 / (1.0 + (residual / scale) * (residual / scale))
+            nx, ny = pieces[k, 5], pieces[k, 6]
+            residual = nx * x + ny * y - pieces[k, 7]
+            weight = squared_scale / (squared_scale + residual * residual)
             nt = ny * rx - nx * ry
+            wx, wy, wt = weight * nx, weight * ny, weight * nt
             used += 1
-            hessian[0, 0] += weight * nx * nx
-            hessian[0, 1] += weight * nx * ny
-            hessian[0, 2] += weight * nx * nt
-            hessian[1, 1] += weight * ny * ny
-            hessian[1, 2] += weight * ny * nt
-            hessian[2, 2] += weight * nt * nt
-            right[0] -= weight * nx * residual
-            right[1] -= weight * ny * residual
-            right[2] -= weight * nt * residual
+            xx += wx * nx
+            xy += wx * ny
+            xt += wx * nt
+            yy += wy * ny
+            yt += wy * nt
+            tt += wt * nt
+            gx += wx * residual
+            gy += wy * residual
+            gt += wt * residual
         if used < 3:
             return start.copy(), iteration, False
         # Damping in proportion to the whole: a direction that no line fixes (along a corridor) stays put.
-        damping = 1e-3 * (hessian[0, 0] + hessian[1, 1]) + 1e-9
-        hessian[0, 0] += damping
-        hessian[1, 1] += damping
-        hessian[2, 2] += damping
+        damping = 1e-3 * (xx + yy) + 1e-9
+        hessian[0, 0], hessian[0, 1], hessian[0, 2] = xx + damping, xy, xt
+        hessian[1, 1], hessian[1, 2], hessian[2, 2] = yy + damping, yt, tt + damping
+        right[0], right[1], right[2] = -gx, -gy, -gt
         solve3(hessian, right, step)
         pose[0] += step[0]
         pose[1] += step[1]

@@ -34,6 +34,15 @@ RESOLUTION = 0.05
 
 MAXIMUM_CELLS_PER_SIDE = 2000
 
+LANES = 16
+"""Cells rasterised at a time."""
+
+NUMBER_BITS = 16
+"""Bits of a segment's number in a cell of the raster, unless there are more segments; the others are its distance."""
+
+EMPTY = np.uint32(0xFFFFFFFF)
+"""A cell with no segment within reach."""
+
 
 @dataclass(frozen=True, eq=False)
 class Surface:
@@ -43,85 +52,96 @@ class Surface:
     ----------
     segments : float64 (S, 4)
         Ends ``ax, ay, bx, by`` (m); equal ends for a lone return.
-    lines : float64 (S, 4)
-        A point of the fitted line and its unit normal, ``mx, my, nx, ny``; a lone return's normal is zero.
-    nearest : int32 (H, W)
-        Number of the segment nearest to each cell's centre, -1 where none is within `REACH`.
-    frame : float64 (3,)
-        Position (m) of the corner of cell (0, 0), and cells per metre.
+    pieces : float64 (S, 8)
+        What the distance of a place from a segment and from its line is computed from, side by side in memory: a
+        segment's beginning ``ax, ay``, unit direction ``ux, uy`` and length, then the fitted line's unit normal
+        and offset, ``nx * x + ny * y = offset``; a lone return's direction and normal are zero.
+    nearest : uint32 (H, W)
+        For each cell's centre the nearest segment: see `nearest_segment`.
+    frame : float64 (4,)
+        Position (m) of the corner of cell (0, 0), cells per metre, and the bits of a segment's number in a cell.
     """
 
     segments: NDArray[np.float64]
-    lines: NDArray[np.float64]
-    nearest: NDArray[np.int32]
+    pieces: NDArray[np.float64]
+    nearest: NDArray[np.uint32]
     frame: NDArray[np.float64]
 
     @classmethod
     def build(cls, points: Points) -> Surface:
         """Make the surface of (N, 2) finite points in beam order; scans may follow one another."""
-        if len(points) == 0:
-            return cls(
-                np.empty((0, 4)),
-                np.empty((0, 4)),
-                np.full((1, 1), -1, dtype=np.int32),
-                np.array([0.0, 0.0, 1.0]),
-            )
-        return cls._of(*join(points, GAP, FIT_SPAN, FIT_ROUGHNESS))
-
-    @classmethod
-    def _of(cls, segments: NDArray[np.float64], lines: NDArray[np.float64]) -> Surface:
-        ends = segments.reshape(-1, 2)
-        low = ends.min(axis=0) - REACH
-        extent = ends.max(axis=0) + REACH - low
-        resolution = max(RESOLUTION, float(extent.max()) / MAXIMUM_CELLS_PER_SIDE)
-        columns, rows = (int(v) for v in np.ceil(extent / resolution) + 1)
-        frame = np.array([low[0], low[1], 1.0 / resolution])
-        return cls(segments, lines, rasterise_nearest(segments, frame, rows, columns, REACH), frame)
+        segments, pieces = join(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
+        return cls(segments, pieces, *rasterise_nearest(segments, RESOLUTION, REACH))
 
     def extended(self, points: Points) -> Surface:
         """The surface with one more scan's (N, 2) points; takes over this one's raster, which is then void."""
-        if len(self.segments) == 0 or len(points) == 0:
-            return Surface.build(points) if len(points) else self
-        added, lines = join(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
-        segments, lines = np.vstack((self.segments, added)), np.vstack((self.lines, lines))
-        low, high = points.min(axis=0) - REACH, points.max(axis=0) + REACH
-        room = make_room(self.nearest, self.frame, low, high, -1, MAXIMUM_CELLS_PER_SIDE)
+        added, pieces = join(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
+        segments, pieces = np.concatenate((self.segments, added)), np.concatenate((self.pieces, pieces))
+        left, bottom, right, top = bounds(added)
+        low = np.array([left, bottom]) - REACH
+        high = np.array([right, top]) + REACH + LANES / self.frame[2]
+        room = None
+        if 0 < len(self.segments) and len(segments) < 2 ** int(self.frame[3]):
+            room = make_room(self.nearest, self.frame, low, high, int(EMPTY), MAXIMUM_CELLS_PER_SIDE)
         if room is None:
-            return Surface._of(segments, lines)
-        nearest, frame = room
-        add_nearest(segments, len(self.segments), nearest, frame, REACH)
-        return Surface(segments, lines, nearest, frame)
+            return Surface(segments, pieces, *rasterise_nearest(segments, RESOLUTION, REACH))
+        add_nearest(segments, len(self.segments), *room, REACH)
+        return Surface(segments, pieces, *room)
+
+
+@kernel
+def bounds(segments: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    """Smallest and largest coordinates of (S, 4) segments: left, bottom, right, top; all zero if there are none."""
+    if segments.shape[0] == 0:
+        return 0.0, 0.0, 0.0, 0.0
+    left, bottom = right, top = segments[0, 0], segments[0, 1]
+    for k in range(segments.shape[0]):
+        for end in (0, 2):
+            x, y = segments[k, end], segments[k, end + 1]
+            left, right = min(left, x), max(right, x)
+            bottom, top = min(bottom, y), max(top, y)
+    return left, bottom, right, top
 
 
 @kernel
 def join(
     points: Points, gap: float, span: float, roughness: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Segments (S, 4) between neighbouring points closer than ``gap``, and their fitted lines (S, 4)."""
+    """Segments (S, 4) between neighbouring points closer than ``gap``, and `Surface.pieces` (S, 8)."""
     n = points.shape[0]
     segments = np.empty((n, 4))
-    lines = np.empty((n, 4))
+    pieces = np.empty((n, 8))
+    line = np.empty(4)
     count = 0
     joined_before = False
     for i in range(n):
+        dx = dy = length = 0.0
         joined = False
         if i + 1 < n:
             dx = points[i + 1, 0] - points[i, 0]
             dy = points[i + 1, 1] - points[i, 1]
             joined = dx * dx + dy * dy <= gap * gap
         if joined:
-            segments[count, 0], segments[count, 1] = points[i, 0], points[i, 1]
-            segments[count, 2], segments[count, 3] = points[i + 1, 0], points[i + 1, 1]
-            fit_line(points, i, gap, span, roughness, lines[count])
-            count += 1
+            fit_line(points, i, gap, span, roughness, line)
+            length = math.sqrt(dx * dx + dy * dy)
         elif not joined_before:
-            segments[count, 0], segments[count, 1] = points[i, 0], points[i, 1]
-            segments[count, 2], segments[count, 3] = points[i, 0], points[i, 1]
-            lines[count, 0], lines[count, 1] = points[i, 0], points[i, 1]
-            lines[count, 2], lines[count, 3] = 0.0, 0.0
+            line[:] = 0.0
+            dx = dy = 0.0
+        if joined or not joined_before:
+            ax, ay = points[i, 0], points[i, 1]
+            segments[count, 0], segments[count, 1] = ax, ay
+            segments[count, 2], segments[count, 3] = ax, ay
+            if joined:
+                segments[count, 2], segments[count, 3] = points[i + 1, 0], points[i + 1, 1]
+            pieces[count, 0], pieces[count, 1] = ax, ay
+            pieces[count, 2] = dx / length if length > 0.0 else 0.0
+            pieces[count, 3] = dy / length if length > 0.0 else 0.0
+            pieces[count, 4] = length
+            pieces[count, 5], pieces[count, 6] = line[2], line[3]
+            pieces[count, 7] = line[2] * line[0] + line[3] * line[1]
             count += 1
         joined_before = joined
-    return segments[:count].copy(), lines[:count].copy()
+    return segments[:count].copy(), pieces[:count].copy()
 
 
 @kernel
@@ -182,89 +202,92 @@ def fit_line(
 
 
 @kernel
-def squared_distance(segment: NDArray[np.float64], x: float, y: float) -> float:
-    """Squared distance (m^2) of a place from a segment (4,)."""
-    dx, dy = segment[2] - segment[0], segment[3] - segment[1]
-    px, py = x - segment[0], y - segment[1]
-    length = dx * dx + dy * dy
-    t = 0.0
-    if length > 0.0:
-        t = min(max((px * dx + py * dy) / length, 0.0), 1.0)
-    ex, ey = px - t * dx, py - t * dy
+def squared_distance(pieces: NDArray[np.float64], k: int, x: float, y: float) -> float:
+    """Squared distance (m^2) of a place from segment ``k``, given `Surface.pieces`."""
+    px, py = x - pieces[k, 0], y - pieces[k, 1]
+    along = min(max(px * pieces[k, 2] + py * pieces[k, 3], 0.0), pieces[k, 4])
+    ex, ey = px - along * pieces[k, 2], py - along * pieces[k, 3]
     squared: float = ex * ex + ey * ey
     return squared
 
 
 @kernel
 def rasterise_nearest(
-    segments: NDArray[np.float64], frame: NDArray[np.float64], rows: int, columns: int, reach: float
-) -> NDArray[np.int32]:
-    """Number of the segment nearest to each cell's centre, int32 (rows, columns); -1 beyond ``reach``."""
-    nearest = np.full((rows, columns), -1, dtype=np.int32)
-    best = np.empty((rows, columns), dtype=np.float32)
-    per_metre = frame[2]
-    cell = 1.0 / per_metre
-    for k in range(segments.shape[0]):
-        ax, ay, bx, by = segments[k, 0], segments[k, 1], segments[k, 2], segments[k, 3]
-        left = max(int((min(ax, bx) - reach - frame[0]) * per_metre), 0)
-        right = min(int((max(ax, bx) + reach - frame[0]) * per_metre), columns - 1)
-        bottom = max(int((min(ay, by) - reach - frame[1]) * per_metre), 0)
-        top = min(int((max(ay, by) + reach - frame[1]) * per_metre), rows - 1)
-        dx, dy = bx - ax, by - ay
-        length = dx * dx + dy * dy
-        per_length = 1.0 / length if length > 0.0 else 0.0
-        for row in range(bottom, top + 1):
-            py = frame[1] + (row + 0.5) * cell - ay
-            for column in range(left, right + 1):
-                px = frame[0] + (column + 0.5) * cell - ax
-                t = min(max((px * dx + py * dy) * per_length, 0.0), 1.0)
-                ex, ey = px - t * dx, py - t * dy
-                distance = np.float32(ex * ex + ey * ey)
-                if distance <= reach * reach and (nearest[row, column] < 0 or distance < best[row, column]):
-                    best[row, column] = distance
-                    nearest[row, column] = k
-    return nearest
+    segments: NDArray[np.float64], resolution: float, reach: float
+) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
+    """Find the segment nearest to each cell's centre: `Surface.nearest` and `Surface.frame`."""
+    left, bottom, right, top = bounds(segments)
+    cell = max(resolution, (max(right - left, top - bottom) + 2.0 * reach) / MAXIMUM_CELLS_PER_SIDE)
+    # The last lanes of a row's last cells must not end up in the next row.
+    columns = math.ceil((right - left + 2.0 * reach) / cell) + 1 + LANES
+    rows = math.ceil((top - bottom + 2.0 * reach) / cell) + 1
+    bits = NUMBER_BITS
+    while segments.shape[0] >= 1 << (bits - 1):
+        bits += 1
+    frame = np.array([left - reach, bottom - reach, 1.0 / cell, float(bits)])
+    nearest = np.full((rows, columns), EMPTY, dtype=np.uint32)
+    add_nearest(segments, 0, nearest, frame, reach)
+    return nearest, frame
 
 
 @kernel
 def add_nearest(
     segments: NDArray[np.float64],
-    first: int,
-    nearest: NDArray[np.int32],
+    begin: int,
+    nearest: NDArray[np.uint32],
     frame: NDArray[np.float64],
     reach: float,
 ) -> None:
-    """Bring the segments from number ``first`` on into a raster of the earlier ones, in place.
+    """Bring the segments from number ``begin`` on into a raster of the earlier ones, in place.
 
-    What stands in a cell stays unless the new segment is nearer to the cell's centre.
+    A cell holds its squared distance from the segment, in the upper bits, and the segment's number, so that the
+    nearest is the smallest number: no branch, and `LANES` cells at a time. Right of every segment's reach a row
+    must have as many cells more.
     """
     rows, columns = nearest.shape
-    per_metre = frame[2]
-    cell = 1.0 / per_metre
-    for k in range(first, segments.shape[0]):
+    flat = nearest.reshape(nearest.size)
+    cell = 1.0 / frame[2]
+    bits = int(frame[3])
+    shift, empty = np.uint32(bits), EMPTY
+    limit = np.float32(reach * reach)
+    steps = np.float32((2.0 ** (32 - bits) - 2.0) / (reach * reach))
+    zero, one, wide = np.float32(0.0), np.float32(1.0), np.float32(cell)
+    for k in range(begin, segments.shape[0]):
         ax, ay, bx, by = segments[k, 0], segments[k, 1], segments[k, 2], segments[k, 3]
-        left = max(int((min(ax, bx) - reach - frame[0]) * per_metre), 0)
-        right = min(int((max(ax, bx) + reach - frame[0]) * per_metre), columns - 1)
-        bottom = max(int((min(ay, by) - reach - frame[1]) * per_metre), 0)
-        top = min(int((max(ay, by) + reach - frame[1]) * per_metre), rows - 1)
-        for row in range(bottom, top + 1):
-            y = frame[1] + (row + 0.5) * cell
-            for column in range(left, right + 1):
-                x = frame[0] + (column + 0.5) * cell
-                distance = squared_distance(segments[k], x, y)
-                if distance > reach * reach:
-                    continue
-                other = nearest[row, column]
-                if other < 0 or distance < squared_distance(segments[other], x, y):
-                    nearest[row, column] = k
+        first = int((min(ax, bx) - reach - frame[0]) * frame[2])
+        last = int((max(ax, bx) + reach - frame[0]) * frame[2])
+        low = max(int((min(ay, by) - reach - frame[1]) * frame[2]), 0)
+        high = min(int((max(ay, by) + reach - frame[1]) * frame[2]), rows - 1)
+        dx, dy = np.float32(bx - ax), np.float32(by - ay)
+        length = dx * dx + dy * dy
+        per_length = one / length if length > zero else zero
+        number = np.uint32(k)
+        for row in range(low, high + 1):
+            py = np.float32(frame[1] + (row + 0.5) * cell - ay)
+            start = max(first, 0)
+            while start <= last:
+                base = np.float32(frame[0] + (start + 0.5) * cell - ax)
+                at = np.uint64(row * columns + start)
+                for lane in range(LANES):
+                    px = base + np.float32(lane) * wide
+                    t = min(max((px * dx + py * dy) * per_length, zero), one)
+                    ex, ey = px - t * dx, py - t * dy
+                    squared = ex * ex + ey * ey
+                    near = np.uint32(np.int32(min(squared, limit) * steps))
+                    key = np.uint32(np.uint32(near << shift) | number)
+                    found = key if squared <= limit else empty
+                    flat[at + np.uint64(lane)] = min(flat[at + np.uint64(lane)], found)
+                start += LANES
 
 
 @kernel
-def nearest_segment(nearest: NDArray[np.int32], frame: NDArray[np.float64], x: float, y: float) -> int:
+def nearest_segment(nearest: NDArray[np.uint32], frame: NDArray[np.float64], x: float, y: float) -> int:
     """Number of the segment nearest to a place, -1 where none is within reach."""
     u = (x - frame[0]) * frame[2]
     v = (y - frame[1]) * frame[2]
     if u < 0.0 or v < 0.0 or u >= nearest.shape[1] or v >= nearest.shape[0]:
         return -1
-    found: int = nearest[int(v), int(u)]
-    return found
+    key = nearest[int(v), int(u)]
+    if key == EMPTY:
+        return -1
+    return int(key) & ((1 << int(frame[3])) - 1)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from hsslam.kernels.refine import refine
-from hsslam.kernels.surface import MAXIMUM_CELLS_PER_SIDE, rasterise_nearest
+from hsslam.kernels.surface import rasterise_nearest
 from hsslam.matching.interface import Reference
 from hsslam.se2 import Points, Pose
 
@@ -27,19 +24,7 @@ class PointToLineReference(Reference):
 
     def __init__(self, points: Points, reach: float) -> None:
         super().__init__(points)
-        self.far, self.far_frame = _nearest(self.surface.segments, reach)
-
-
-def _nearest(segments: NDArray[np.float64], reach: float) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    if len(segments) == 0:
-        return np.full((1, 1), -1, dtype=np.int32), np.array([0.0, 0.0, 1.0])
-    ends = segments.reshape(-1, 2)
-    low = ends.min(axis=0) - reach
-    extent = ends.max(axis=0) + reach - low
-    resolution = max(RESOLUTION, float(extent.max()) / MAXIMUM_CELLS_PER_SIDE)
-    columns, rows = (int(v) for v in np.ceil(extent / resolution) + 1)
-    frame = np.array([low[0], low[1], 1.0 / resolution])
-    return rasterise_nearest(segments, frame, rows, columns, reach), frame
+        self.far, self.far_frame = rasterise_nearest(self.surface.segments, RESOLUTION, reach)
 
 
 def point_to_line_icp(
@@ -77,8 +62,7 @@ def point_to_line_icp(
     """
     surface = reference.surface
     coarse, first, _ = refine(
-        surface.segments,
-        surface.lines,
+        surface.pieces,
         reference.far,
         reference.far_frame,
         points,
@@ -89,8 +73,7 @@ def point_to_line_icp(
         scales[0],
     )
     fine, second, converged = refine(
-        surface.segments,
-        surface.lines,
+        surface.pieces,
         surface.nearest,
         surface.frame,
         points,

@@ -18,8 +18,7 @@ def polish(reference: Reference, points: Points, start: Pose, iterations: int) -
     """Refine a pose by point-to-line Gauss-Newton, as population matchers do: the pose, iterations spent."""
     surface = reference.surface
     pose, spent, _ = refine(
-        surface.segments,
-        surface.lines,
+        surface.pieces,
         surface.nearest,
         surface.frame,
         points,
