@@ -150,7 +150,9 @@ def test_refinement_returns_to_the_truth(x: float, y: float, theta: float) -> No
     )
     s = Surface.build(reference)
     start = truth + [x, y, theta]
-    found, _, converged = refine(s.pieces, s.nearest, s.frame, inverse_points, start, 30, 0.15, 0.08, 0.03)
+    found, _, converged = refine(
+        s.pieces, s.nearest, s.frame, inverse_points, start, 30, 15.0, (0.15, 0.08), (0.03, 0.03)
+    )
     assert converged
     assert found == pytest.approx(truth, abs=2e-3)
 

@@ -16,7 +16,6 @@ from hsslam.errors import ConfigError, MatcherUnavailableError
 from hsslam.matching import SearchWindow, create, describe
 from hsslam_plugins import open3d_library
 from hsslam_plugins.icp import Icp, line_normals
-from hsslam_plugins.local import keep_in_window
 
 WINDOW = SearchWindow(0.2, 0.2, np.radians(10.0))
 
@@ -109,9 +108,9 @@ def test_an_answer_across_the_edge_of_the_window_moves_onto_it(icp, room_pair) -
 def test_keeping_in_the_window_goes_round_the_circle() -> None:
     guess = np.array([1.0, 2.0, np.pi - 0.05])
     outside = np.array([1.22, 2.0, -np.pi + 0.01])
-    kept = keep_in_window(outside, guess, WINDOW, 0.2)
+    kept = WINDOW.keep(guess, outside, 0.2)
     assert kept == pytest.approx([1.2, 2.0, np.pi + 0.01])
-    assert keep_in_window(outside, guess, WINDOW, 0.05) is outside
+    assert WINDOW.keep(guess, outside, 0.05) is outside
     assert outside.tolist() == [1.22, 2.0, -np.pi + 0.01]
 
 

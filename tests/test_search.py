@@ -92,6 +92,18 @@ def test_refinement_beats_the_search_alone(room_pair: Pair) -> None:
     assert errors[True] < 0.5 * errors[False]
 
 
+@pytest.mark.parametrize("name", ["hsl", "hide"])
+def test_a_truth_just_outside_the_window_is_refined_onto_its_edge(name: str, room_pair: Pair) -> None:
+    reference, scan, truth = room_pair
+    matcher = create(name)
+    prepared = matcher.prepare(reference)
+    for seed in range(5):
+        guess = truth - [1.1 * WINDOW.half_x, 0.04, 0.05]
+        result = matcher.match(prepared, scan, guess, WINDOW, np.random.default_rng(seed))
+        assert result.pose[0] == pytest.approx(guess[0] + WINDOW.half_x)
+        assert result.pose[1:] == pytest.approx(truth[1:], abs=0.005)
+
+
 @given(st.integers(2, 20), st.floats(-1.0, 1.0))
 @settings(deadline=None, max_examples=50)
 def test_gray_code_round_trip(bits: int, share: float) -> None:

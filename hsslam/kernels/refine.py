@@ -20,9 +20,9 @@ def refine(
     points: Points,
     start: Pose,
     iterations: int,
-    distance_start: float,
-    distance_end: float,
-    scale: float,
+    settle: float,
+    distances: tuple[float, float],
+    scales: tuple[float, float],
 ) -> tuple[Pose, int, bool]:
     """Minimise the Cauchy-weighted distances of points from the lines of their nearest segments.
 
@@ -36,10 +36,12 @@ def refine(
         Where to begin.
     iterations : int
         At most.
-    distance_start, distance_end : float
-        Points further than this from the surface are left out (m); shrinks from iteration to iteration.
-    scale : float
-        Of the Cauchy weight ``1 / (1 + (r / scale)^2)`` (m).
+    settle : float
+        Iterations in which reach and scale would shrink to zero, linearly, if they did not stop at their ends.
+    distances : (float, float)
+        Points further than this from the surface are left out (m), from the first to the last.
+    scales : (float, float)
+        Of the Cauchy weight ``1 / (1 + (r / scale)^2)`` (m), from the first to the last.
 
     Returns
     -------
@@ -50,10 +52,11 @@ def refine(
     hessian = np.empty((3, 3))
     right = np.empty(3)
     step = np.empty(3)
-    squared_scale = scale * scale
     for iteration in range(iterations):
-        share = iteration / max(iterations - 1, 1)
-        distance = max(distance_end, distance_start * (1.0 - 2.0 * share))
+        left = 1.0 - iteration / settle
+        distance = max(distances[1], distances[0] * left)
+        squared_scale = max(scales[1], scales[0] * left) ** 2
+        settled = distance <= distances[1] and squared_scale <= scales[1] ** 2
         c, s = math.cos(pose[2]), math.sin(pose[2])
         x0, y0 = pose[0], pose[1]
         xx = xy = xt = yy = yt = tt = gx = gy = gt = 0.0
@@ -91,7 +94,7 @@ def refine(
         pose[0] += step[0]
         pose[1] += step[1]
         pose[2] = wrap(pose[2] + step[2])
-        if distance <= distance_end and abs(step[0]) + abs(step[1]) < 1e-4 and abs(step[2]) < 1e-4:
+        if settled and abs(step[0]) + abs(step[1]) < 1e-4 and abs(step[2]) < 1e-4:
             return pose, iteration + 1, True
     return pose, iterations, False
 

@@ -68,6 +68,20 @@ class SearchWindow:
             and abs(wrap(pose[2] - guess[2])) <= self.half_theta + tolerance
         )
 
+    def keep(self, guess: Pose, pose: Pose, slack: float) -> Pose:
+        """Move a pose that is just outside the window around ``guess`` onto its edge; leave any other as it is.
+
+        Noise alone carries a truth near the edge across it. ``slack`` is how far outside counts as just outside,
+        as a share of the half sides.
+        """
+        if self.contains(guess, pose):
+            return pose
+        offset = pose - guess
+        offset[2] = wrap(offset[2])
+        if not (np.abs(offset) <= (1.0 + slack) * self.half).all():
+            return pose
+        return guess + np.minimum(np.maximum(offset, -self.half), self.half)
+
 
 class Reference:
     """What scans are matched against: the points of a scan or of a submap, in one frame.

@@ -68,9 +68,9 @@ def point_to_line_icp(
         points,
         guess,
         iterations,
-        distances[0],
-        distances[1],
-        scales[0],
+        0.5 * (iterations - 1),
+        (distances[0], distances[1]),
+        (scales[0], scales[0]),
     )
     fine, second, converged = refine(
         surface.pieces,
@@ -79,8 +79,8 @@ def point_to_line_icp(
         points,
         coarse,
         iterations,
-        distances[1],
-        distances[2],
-        scales[1],
+        0.5 * (iterations - 1),
+        (distances[1], distances[2]),
+        (scales[1], scales[1]),
     )
     return fine, first + second, converged

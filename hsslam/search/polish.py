@@ -3,19 +3,32 @@
 from __future__ import annotations
 
 from hsslam.kernels.refine import refine
-from hsslam.matching.interface import Reference
+from hsslam.matching.interface import Reference, SearchWindow
 from hsslam.se2 import Points, Pose
 
-FIRST_REACH = 0.15
-LAST_REACH = 0.08
+SETTLE = 4.0
+"""Iterations after which reach and scale would be zero if they went on to shrink."""
+
+REACHES = (0.15, 0.08)
 """The refinement uses points this near to the surface (m), from the first iteration to the last."""
 
-CAUCHY_SCALE = 0.03
-"""Scale of the refinement's robust weight (m)."""
+SCALES = (0.10, 0.03)
+"""Scale of the refinement's robust weight (m), from the first iteration to the last."""
 
 
-def polish(reference: Reference, points: Points, start: Pose, iterations: int) -> tuple[Pose, int]:
-    """Refine a pose by point-to-line Gauss-Newton, as population matchers do: the pose, iterations spent."""
+WINDOW_SLACK = 0.4
+"""A refined pose outside the window by up to this share of its half sides is moved onto its edge.
+
+Where a truth lies near the edge, noise alone carries the refined pose across it."""
+
+
+def polish(
+    reference: Reference, points: Points, start: Pose, guess: Pose, window: SearchWindow, iterations: int
+) -> tuple[Pose, int]:
+    """Refine a pose by point-to-line Gauss-Newton, as population matchers do: the pose, iterations spent.
+
+    A refinement that leads away from the window is discarded: then the pose is ``start``.
+    """
     surface = reference.surface
     pose, spent, _ = refine(
         surface.pieces,
@@ -24,8 +37,9 @@ def polish(reference: Reference, points: Points, start: Pose, iterations: int) -
         points,
         start,
         iterations,
-        FIRST_REACH,
-        LAST_REACH,
-        CAUCHY_SCALE,
+        SETTLE,
+        REACHES,
+        SCALES,
     )
-    return pose, spent
+    pose = window.keep(guess, pose, WINDOW_SLACK)
+    return pose if window.contains(guess, pose) else start, spent

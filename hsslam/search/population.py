@@ -126,7 +126,7 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
         window: SearchWindow,
         rng: np.random.Generator,
     ) -> Estimate:
-        """Search, then refine; a refinement that leaves the window is discarded."""
+        """Search, then refine; see `hsslam.search.polish.polish`."""
         assert isinstance(reference, PopulationReference)
         raster = reference.coarse if self.is_wide(window) else reference.raster
         fitness = HitFitness.of(raster, points)
@@ -135,7 +135,7 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
         if not self.config.refine:
             spread = plateau(points, raster.half_side)
             return Estimate(found, evaluations=evaluations, spread=spread, diagnostics=diagnostics)
-        refined, iterations = polish(reference, points, found, self.config.refine_iterations)
-        diagnostics["refine_iterations"] = iterations
-        kept = window.contains(guess, refined)
-        return Estimate(refined if kept else found, evaluations=evaluations, diagnostics=diagnostics)
+        refined, diagnostics["refine_iterations"] = polish(
+            reference, points, found, guess, window, self.config.refine_iterations
+        )
+        return Estimate(refined, evaluations=evaluations, diagnostics=diagnostics)

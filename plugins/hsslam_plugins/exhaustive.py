@@ -62,7 +62,7 @@ class Exhaustive(Matcher[ExhaustiveConfig]):
         window: SearchWindow,
         rng: np.random.Generator,
     ) -> Estimate:
-        """Search, prove, refine; a refinement that leaves the window is discarded."""
+        """Search, prove, refine; see `hsslam.search.polish.polish`."""
         assert isinstance(reference, ExhaustiveReference)
         config = self.config
         fitness = reference.fitness_of(points)
@@ -79,9 +79,6 @@ class Exhaustive(Matcher[ExhaustiveConfig]):
             spread = plateau(points, reference.raster.half_side)
             return Estimate(proof.pose, evaluations=proof.evaluations, spread=spread, diagnostics=diagnostics)
         refined, diagnostics["refine_iterations"] = polish(
-            reference, points, proof.pose, config.refine_iterations
+            reference, points, proof.pose, guess, window, config.refine_iterations
         )
-        kept = window.contains(guess, refined)
-        return Estimate(
-            refined if kept else proof.pose, evaluations=proof.evaluations, diagnostics=diagnostics
-        )
+        return Estimate(refined, evaluations=proof.evaluations, diagnostics=diagnostics)

@@ -17,7 +17,7 @@ from hsslam.matching import (
     SearchWindow,
     clean,
 )
-from hsslam_plugins.local import LocalConfig, in_space, keep_in_window, planar_pose, transformation
+from hsslam_plugins.local import LocalConfig, in_space, planar_pose, transformation
 from hsslam_plugins.open3d_library import one_thread, open3d
 
 
@@ -117,7 +117,7 @@ class Icp(Matcher[IcpConfig]):
                 matrix = result.transformation
         matched = float(result.fitness)
         return Estimate(
-            pose=keep_in_window(planar_pose(matrix), guess, window, config.window_slack),
+            pose=window.keep(guess, planar_pose(matrix), config.window_slack),
             converged=matched * len(points) >= 3.0,
             diagnostics={"fitness": matched, "inlier_rmse": float(result.inlier_rmse)},
         )

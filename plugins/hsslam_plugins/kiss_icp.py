@@ -17,7 +17,7 @@ from hsslam.matching import (
     SearchWindow,
     clean,
 )
-from hsslam_plugins.local import LocalConfig, in_space, keep_in_window, planar_pose, transformation
+from hsslam_plugins.local import LocalConfig, in_space, planar_pose, transformation
 
 INSTALL = "pip install 'hsslam[kiss-icp]'"
 
@@ -136,7 +136,7 @@ class KissIcp(Matcher[KissIcpConfig]):
         ):
             matrix = registration.align_points_to_map(scan, reference.voxels, matrix, distance, scale)
         return Estimate(
-            keep_in_window(planar_pose(matrix), guess, window, config.window_slack),
+            window.keep(guess, planar_pose(matrix), config.window_slack),
             spread=POINT_TO_POINT_SPREAD,
         )
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from hsslam.matching import MatcherConfig, Points, Pose, SearchWindow
+from hsslam.matching import MatcherConfig, Points, Pose
 
 
 class LocalConfig(MatcherConfig):
@@ -40,22 +40,3 @@ def transformation(pose: Pose) -> NDArray[np.float64]:
 def planar_pose(matrix: NDArray[np.float64]) -> Pose:
     """Read the pose off the (4, 4) matrix of a motion in the plane."""
     return np.array([matrix[0, 3], matrix[1, 3], math.atan2(matrix[1, 0], matrix[0, 0])])
-
-
-def keep_in_window(pose: Pose, guess: Pose, window: SearchWindow, slack: float) -> Pose:
-    """Move a pose that is just outside the window onto its edge; leave any other pose as it is.
-
-    Parameters
-    ----------
-    pose, guess : Pose
-        The answer, and the window's centre.
-    window : SearchWindow
-        Where the answer must be.
-    slack : float
-        How far outside counts as just outside, as a share of the half sides.
-    """
-    offset = pose - guess
-    offset[2] = (offset[2] + math.pi) % (2.0 * math.pi) - math.pi
-    if not (np.abs(offset) <= (1.0 + slack) * window.half).all():
-        return pose
-    return guess + np.clip(offset, -window.half, window.half)

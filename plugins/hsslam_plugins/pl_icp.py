@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from hsslam.matching import Estimate, Matcher, Points, Pose, Reference, SearchWindow, clean
 from hsslam.search.point_to_line import PointToLineReference, point_to_line_icp
-from hsslam_plugins.local import LocalConfig, keep_in_window
+from hsslam_plugins.local import LocalConfig
 
 
 class PlIcpConfig(LocalConfig):
@@ -72,7 +72,7 @@ class PlIcp(Matcher[PlIcpConfig]):
             (config.robust_scale_start, config.robust_scale_end),
         )
         return Estimate(
-            keep_in_window(pose, guess, window, config.window_slack),
+            window.keep(guess, pose, config.window_slack),
             converged=converged,
             evaluations=iterations,
         )

@@ -17,7 +17,7 @@ from hsslam.matching import (
     SearchWindow,
     clean,
 )
-from hsslam_plugins.local import LocalConfig, keep_in_window, planar_pose, transformation
+from hsslam_plugins.local import LocalConfig, planar_pose, transformation
 
 INSTALL = "pip install 'hsslam[small-gicp]'"
 
@@ -107,7 +107,7 @@ class SmallGicp(Matcher[SmallGicpConfig]):
             # Three copies of three points: what fixes a pose in the plane.
             converged = bool(result.converged) and int(result.num_inliers) >= 9
         return Estimate(
-            keep_in_window(planar_pose(matrix), guess, window, config.window_slack),
+            window.keep(guess, planar_pose(matrix), config.window_slack),
             converged=converged,
             evaluations=iterations,
         )
