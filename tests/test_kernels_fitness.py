@@ -121,13 +121,13 @@ def test_score_is_the_share_of_points_near_the_surface() -> None:
     points = corner()
     surface = Surface.build(points)
     far = points[:30] + [5.0, 5.0]
-    score, _ = assess(surface, np.vstack((points, far)), np.zeros(3), WINDOW, 0.1)
+    score, _, _ = assess(surface, np.vstack((points, far)), np.zeros(3), WINDOW, 0.1)
     assert score == pytest.approx(len(points) / (len(points) + 30))
 
 
 def test_covariance_is_larger_along_a_plain_wall() -> None:
     wall = np.column_stack((np.arange(-2.0, 2.0, 0.05), np.full(80, 1.5)))
-    _, covariance = assess(Surface.build(wall), wall, np.zeros(3), WINDOW, 0.1)
+    _, covariance, _ = assess(Surface.build(wall), wall, np.zeros(3), WINDOW, 0.1)
     assert np.sqrt(covariance[0, 0]) == pytest.approx(0.2 / np.sqrt(3.0), rel=0.05)
     assert np.sqrt(covariance[1, 1]) < 0.01
     assert np.linalg.eigvalsh(covariance)[0] > 0.0
@@ -135,7 +135,7 @@ def test_covariance_is_larger_along_a_plain_wall() -> None:
 
 def test_covariance_inverts_the_information() -> None:
     points = corner()
-    _, covariance = assess(Surface.build(points), points, np.zeros(3), WINDOW, 0.1)
+    _, covariance, _ = assess(Surface.build(points), points, np.zeros(3), WINDOW, 0.1)
     assert covariance == pytest.approx(covariance.T)
     assert np.linalg.eigvalsh(covariance)[0] > 0.0
 
@@ -174,10 +174,10 @@ def test_a_plain_wall_leaves_its_own_direction_open_and_a_corner_none() -> None:
     angle = 0.4
     along = np.arange(-2.0, 2.0, 0.05)
     wall = np.column_stack((along * np.cos(angle), along * np.sin(angle))) + [-0.5, 1.5]
-    _, covariance = assess(Surface.build(wall), wall, np.zeros(3), WINDOW, 0.1)
+    _, covariance, _ = assess(Surface.build(wall), wall, np.zeros(3), WINDOW, 0.1)
     assert degenerate_direction(covariance, WINDOW) == pytest.approx(angle, abs=0.02)
     points = corner()
-    _, covariance = assess(Surface.build(points), points, np.zeros(3), WINDOW, 0.1)
+    _, covariance, _ = assess(Surface.build(points), points, np.zeros(3), WINDOW, 0.1)
     assert np.isnan(degenerate_direction(covariance, WINDOW))
 
 

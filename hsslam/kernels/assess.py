@@ -23,8 +23,8 @@ DEGENERATE_SHARE = 0.1
 
 def assess(
     surface: Surface, points: Points, pose: Pose, half: NDArray[np.float64], distance: float
-) -> tuple[float, NDArray[np.float64]]:
-    """Score and covariance of a scan at a pose.
+) -> tuple[float, NDArray[np.float64], float]:
+    """Score, covariance and degenerate direction of a scan at a pose.
 
     Parameters
     ----------
@@ -46,9 +46,26 @@ def assess(
     covariance : float64 (3, 3)
         Inverse of the information that the matched points hold about the pose across their lines (the
         Gauss-Newton Hessian of point-to-line distances over their variance), plus that of the window.
+    direction : float
+        See `degenerate_direction`.
     """
-    matched, information = gather(surface.pieces, surface.nearest, surface.frame, points, pose, distance)
-    return matched / max(len(points), 1), covariance_of(information, half)
+    return measure(surface.pieces, surface.nearest, surface.frame, points, pose, half, distance)
+
+
+@kernel
+def measure(
+    pieces: NDArray[np.float64],
+    nearest: NDArray[np.uint32],
+    frame: NDArray[np.float64],
+    points: Points,
+    pose: Pose,
+    half: NDArray[np.float64],
+    distance: float,
+) -> tuple[float, NDArray[np.float64], float]:
+    """See `assess`; ``pieces``, ``nearest`` and ``frame`` are the surface's."""
+    matched, information = gather(pieces, nearest, frame, points, pose, distance)
+    covariance = covariance_of(information, half)
+    return matched / max(points.shape[0], 1), covariance, degenerate_direction(covariance, half)
 
 
 @kernel

@@ -21,23 +21,23 @@ _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 @kernel
-def scale(points: Points, per_metre: float) -> NDArray[np.float32]:
-    """Points in cells as `count_points` wants them, float32 (2, M).
+def scale(points: Points, per_metre: float, most: int) -> NDArray[np.float32]:
+    """Points in cells as `count_points` wants them, float32 (2, M): ``most`` of them, or all if there are fewer.
 
     They come in an order in which any first part of them is spread over the whole scan, so that it stands for it.
     """
-    n = points.shape[0]
+    n, used = points.shape[0], min(most, points.shape[0])
     stride = max(round(_GOLDEN * n), 1)
     while greatest_common_divisor(n, stride) > 1:
         stride += 1
-    out = np.empty((2, -(-n // CHUNK) * CHUNK), dtype=np.float32)
+    out = np.empty((2, -(-used // CHUNK) * CHUNK), dtype=np.float32)
     k = 0
-    for i in range(n):
+    for i in range(used):
         out[0, i], out[1, i] = points[k, 0] * per_metre, points[k, 1] * per_metre
         k += stride
         if k >= n:
             k -= n
-    out[:, n:] = NOWHERE
+    out[:, used:] = NOWHERE
     return out
 
 

@@ -61,7 +61,7 @@ def refine(
         x0, y0 = pose[0], pose[1]
         xx = xy = xt = yy = yt = tt = gx = gy = gt = 0.0
         used = 0
-        for i in range(points.shape[0]):
+        for i in range(0, points.shape[0], 1 if settled else 2):
             rx = c * points[i, 0] - s * points[i, 1]
             ry = s * points[i, 0] + c * points[i, 1]
             x, y = x0 + rx, y0 + ry
@@ -94,7 +94,7 @@ def refine(
         pose[0] += step[0]
         pose[1] += step[1]
         pose[2] = wrap(pose[2] + step[2])
-        if settled and abs(step[0]) + abs(step[1]) < 1e-4 and abs(step[2]) < 1e-4:
+        if settled and abs(step[0]) + abs(step[1]) < 3e-4 and abs(step[2]) < 1e-4:
             return pose, iteration + 1, True
     return pose, iterations, False
 

@@ -90,6 +90,16 @@ class Surface:
 
 
 @kernel
+def all_finite(points: Points) -> bool:
+    """Whether all coordinates are."""
+    # What is not finite makes the sum not finite either: it is cheaper to look at once.
+    total = 0.0
+    for i in range(points.shape[0]):
+        total += 0.0 * points[i, 0] + 0.0 * points[i, 1]
+    return total == 0.0
+
+
+@kernel
 def bounds(segments: NDArray[np.float64]) -> tuple[float, float, float, float]:
     """Smallest and largest coordinates of (S, 4) segments: left, bottom, right, top; all zero if there are none."""
     if segments.shape[0] == 0:
@@ -188,9 +198,12 @@ def fit_line(
         half_trace = 0.5 * (xx + yy)
         root = math.sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy)
         if half_trace - root <= roughness * roughness * count and root > 0.0:
-            angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
+            # The long axis of the scatter, in the form that does not cancel.
+            across = 0.5 * (xx - yy)
+            ux, uy = (across + root, xy) if across > 0.0 else (xy, root - across)
+            length = math.sqrt(ux * ux + uy * uy)
             out[0], out[1] = cx, cy
-            out[2], out[3] = -math.sin(angle), math.cos(angle)
+            out[2], out[3] = -uy / length, ux / length
             return
     dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
     length = math.sqrt(dx * dx + dy * dy)

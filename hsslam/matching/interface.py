@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from hsslam.kernels.assess import assess, degenerate_direction
-from hsslam.kernels.surface import Surface
+from hsslam.kernels.assess import assess
+from hsslam.kernels.surface import Surface, all_finite
 from hsslam.se2 import Points, Pose, wrap
 
 MINIMUM_POINTS = 3
@@ -61,12 +61,15 @@ class SearchWindow:
         return np.array([self.half_x, self.half_y, self.half_theta])
 
     def contains(self, guess: Pose, pose: Pose, tolerance: float = 1e-9) -> bool:
-        """Whether ``pose`` is inside the window around ``guess``."""
-        return (
-            abs(pose[0] - guess[0]) <= self.half_x + tolerance
-            and abs(pose[1] - guess[1]) <= self.half_y + tolerance
-            and abs(wrap(pose[2] - guess[2])) <= self.half_theta + tolerance
+        """Whether ``pose`` is inside the window around ``guess``; one that is not finite is not."""
+        x, y, theta = pose.tolist()
+        x0, y0, theta0 = guess.tolist()
+        inside: bool = (
+            abs(x - x0) <= self.half_x + tolerance
+            and abs(y - y0) <= self.half_y + tolerance
+            and abs((theta - theta0 + math.pi) % math.tau - math.pi) <= self.half_theta + tolerance
         )
+        return inside
 
     def keep(self, guess: Pose, pose: Pose, slack: float) -> Pose:
         """Move a pose that is just outside the window around ``guess`` onto its edge; leave any other as it is.
@@ -274,7 +277,7 @@ class Matcher(ABC, Generic[ConfigT]):
         """
         points = clean(points)
         guess = np.ascontiguousarray(guess, dtype=np.float64)
-        if guess.shape != (3,) or not np.isfinite(guess).all():
+        if guess.shape != (3,) or not all(map(math.isfinite, guess.tolist())):
             raise ValueError(f"a guess is three finite numbers (x m, y m, theta rad), not {guess!r}")
         if len(points) < MINIMUM_POINTS or len(reference.points) < MINIMUM_POINTS:
             few = "scan" if len(points) < MINIMUM_POINTS else "reference"
@@ -289,15 +292,16 @@ class Matcher(ABC, Generic[ConfigT]):
         found = self.estimate(reference, points, guess, window, rng)
         pose, converged, diagnostics = found.pose, found.converged, found.diagnostics
         covariance = found.covariance
-        if not np.isfinite(pose).all() or not window.contains(guess, pose):
+        if not window.contains(guess, pose):
             why = "left the search window" if np.isfinite(pose).all() else "is not finite"
             diagnostics = {**diagnostics, "rejected": f"the answer {why}"}
             pose, converged, covariance = guess, False, None
         pose = np.array([pose[0], pose[1], wrap(pose[2])])
-        score, estimated = assess(reference.surface, points, pose, window.half, self.config.score_distance)
-        open_direction = degenerate_direction(estimated, window.half)
-        if not math.isnan(open_direction):
-            diagnostics = {**diagnostics, "degenerate_direction": open_direction}
+        score, estimated, direction = assess(
+            reference.surface, points, pose, window.half, self.config.score_distance
+        )
+        if not math.isnan(direction):
+            diagnostics = {**diagnostics, "degenerate_direction": direction}
         if covariance is None:
             covariance = estimated if found.spread is None else estimated + np.diag(found.spread**2)
         return MatchResult(
@@ -321,6 +325,6 @@ def clean(points: Points) -> Points:
     points = np.ascontiguousarray(points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 2:
         raise ValueError(f"points are an array of shape (N, 2), not {points.shape}")
-    if np.isfinite(points).all():
+    if all_finite(points):
         return points
     return np.ascontiguousarray(points[np.isfinite(points).all(axis=1)])

@@ -37,9 +37,10 @@ class HitFitness:
     count: int
 
     @classmethod
-    def of(cls, raster: Raster, points: Points) -> HitFitness:
-        """Fitness of (N, 2) points against a raster."""
-        return cls(raster.cells, raster.frame, scale(points, raster.frame[2]), len(points))
+    def of(cls, raster: Raster, points: Points, most: int | None = None) -> HitFitness:
+        """Fitness of (N, 2) points against a raster: of all, or of ``most`` spread over the scan."""
+        count = len(points) if most is None else min(most, len(points))
+        return cls(raster.cells, raster.frame, scale(points, raster.frame[2], count), count)
 
     @property
     def xs(self) -> NDArray[np.float32]:

@@ -33,6 +33,12 @@ class PopulationConfig(MatcherConfig):
     half_side: float = Field(0.05, gt=0.0, le=1.0, description="half side of the squares of the fitness (m)")
     resolution: float = Field(0.025, gt=0.0, le=0.5, description="side of a raster cell of the fitness (m)")
     refine: bool = Field(True, description="polish the best pose by point-to-line Gauss-Newton")
+    search_points: int = Field(
+        96,
+        ge=10,
+        description="points of the scan that the search looks at, spread over it, in a window of about the paper's size "
+        "and where a refinement follows, which uses all",
+    )
     refine_iterations: int = Field(12, ge=1, description="iterations of the refinement, at most")
 
 
@@ -128,8 +134,10 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
     ) -> Estimate:
         """Search, then refine; see `hsslam.search.polish.polish`."""
         assert isinstance(reference, PopulationReference)
-        raster = reference.coarse if self.is_wide(window) else reference.raster
-        fitness = HitFitness.of(raster, points)
+        wide = self.is_wide(window)
+        raster = reference.coarse if wide else reference.raster
+        few = self.config.refine and not wide
+        fitness = HitFitness.of(raster, points, self.config.search_points if few else None)
         found, hits, evaluations = self.search(fitness, guess, window, rng)
         diagnostics: dict[str, Any] = {"fitness": fitness.share(hits)}
         if not self.config.refine:
