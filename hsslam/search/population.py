@@ -36,7 +36,7 @@ class PopulationConfig(MatcherConfig):
     search_points: int = Field(
         96,
         ge=10,
-        description="points of the scan that the search looks at, spread over it, in a window of about the paper's size "
+        description="points of the scan that the search looks at, spread over it, in a window of the paper's size "
         "and where a refinement follows, which uses all",
     )
     refine_iterations: int = Field(12, ge=1, description="iterations of the refinement, at most")
