@@ -71,7 +71,7 @@ def test_nearest_segment_is_the_nearest_within_a_cell(
 
 
 def test_lines_average_noise_along_a_wall() -> None:
-    surface = Surface.build(wall(noise=0.01))
+    surface = Surface.build(wall(spacing=0.02, noise=0.01))
     segments_tilt = np.abs(
         np.arctan2(
             surface.segments[:, 3] - surface.segments[:, 1], surface.segments[:, 2] - surface.segments[:, 0]

@@ -20,7 +20,7 @@ from hsslam.se2 import Points
 GAP = 0.35
 """Neighbouring returns further apart than this (m) are not joined."""
 
-FIT_SPAN = 0.2
+FIT_SPAN = 0.15
 """A line is fitted to the returns within this stretch of surface around a segment (m)."""
 
 FIT_ROUGHNESS = 0.03

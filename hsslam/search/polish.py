@@ -12,7 +12,7 @@ SETTLE = 4.0
 REACHES = (0.15, 0.08)
 """The refinement uses points this near to the surface (m), from the first iteration to the last."""
 
-SCALES = (0.10, 0.03)
+SCALES = (0.10, 0.025)
 """Scale of the refinement's robust weight (m), from the first iteration to the last."""
 
 
