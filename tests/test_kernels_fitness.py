@@ -199,3 +199,24 @@ def test_squares_along_segments_are_those_around_their_places(
         gap[near] = np.minimum(gap[near], distance)
     clear = np.abs(gap - half_side) > 0.002
     assert (raster.cells.ravel()[clear] == (gap < half_side)[clear]).all()
+
+
+def test_noise_does_not_close_a_plain_wall() -> None:
+    """Lines fitted to noisy returns are tilted, and so seem to fix the direction along the wall."""
+    rng = np.random.default_rng(0)
+    along = np.arange(-2.0, 2.0, 0.01)
+    wall = np.column_stack((along, 1.5 + rng.normal(0.0, 0.015, len(along))))
+    scan = np.column_stack((along, 1.5 + rng.normal(0.0, 0.015, len(along))))
+    _, covariance, direction = assess(Surface.build(wall), scan, np.zeros(3), WINDOW, 0.1)
+    assert np.sqrt(covariance[0, 0]) > 0.05
+    assert abs(direction) < 0.05
+
+
+def test_covariance_holds_the_way_to_the_bottom() -> None:
+    points = corner()
+    surface = Surface.build(points)
+    off = np.array([0.03, -0.02, 0.0])
+    _, at_truth, _ = assess(surface, points, np.zeros(3), WINDOW, 0.1)
+    _, beside, _ = assess(surface, points, off, WINDOW, 0.1)
+    assert off @ np.linalg.solve(at_truth, off) > 20.0
+    assert off @ np.linalg.solve(beside, off) < 3.0

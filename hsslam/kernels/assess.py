@@ -8,14 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
+from hsslam.kernels.matrix3 import deflate
 from hsslam.kernels.surface import Surface, nearest_segment, squared_distance
 from hsslam.se2 import Points, Pose
 
 RANGE_STD = 0.01
 """Standard deviation (m) of a return across the surface, at least: the noise of indoor scanners."""
 
-CORRELATION = 2.8
+CORRELATION = 1.6
 """Returns that share an error (a bent wall, a bad line fit) and so count as one independent return."""
+
+SPURIOUS = 2.0
+"""How much of the information that noisy directions of lines feign is taken off: more than there is on average,
+since what is left counts as knowledge of a direction that may be open."""
+
+LARGEST_TILT = 0.5
+"""Variance of a line's direction (rad^2) beyond which it points nowhere."""
 
 DEGENERATE_SHARE = 0.1
 """Share of the window's variance that a direction must keep to count as open."""
@@ -44,17 +52,20 @@ def assess(
     score : float
         Share of the points within ``distance`` of the surface.
     covariance : float64 (3, 3)
-        Inverse of the information that the matched points hold about the pose across their lines (the
-        Gauss-Newton Hessian of point-to-line distances over their variance), plus that of the window.
+        What is known of the pose from the matched points and the window, as the framework's design tells it: see
+        `covariance_of` and `measure`.
     direction : float
         See `degenerate_direction`.
     """
-    return measure(surface.pieces, surface.nearest, surface.frame, points, pose, half, distance)
+    return measure(
+        surface.pieces, surface.tilts, surface.nearest, surface.frame, points, pose, half, distance
+    )
 
 
 @kernel
 def measure(
     pieces: NDArray[np.float64],
+    tilts: NDArray[np.float64],
     nearest: NDArray[np.uint32],
     frame: NDArray[np.float64],
     points: Points,
@@ -62,10 +73,30 @@ def measure(
     half: NDArray[np.float64],
     distance: float,
 ) -> tuple[float, NDArray[np.float64], float]:
-    """See `assess`; ``pieces``, ``nearest`` and ``frame`` are the surface's."""
-    matched, information = gather(pieces, nearest, frame, points, pose, distance)
+    """See `assess`; the surface's arrays come first.
+
+    The information of the matched points is the Gauss-Newton Hessian of their distances across their lines, over
+    the variance of these. Two things make it too good. A line fitted to noisy returns is tilted, so that a plain
+    corridor seems to fix the direction along it: what the tilts feign on average is taken off. And a pose that is
+    not at the bottom, where a method gave up early or counts hits, is off by about the step that leads there:
+    the square of that step is added to the covariance.
+    """
+    matched, variance, hessian, feigned, gradient = gather(
+        pieces, tilts, nearest, frame, points, pose, distance
+    )
+    information = deflate(hessian, variance * feigned, SPURIOUS) / (variance * CORRELATION)
     covariance = covariance_of(information, half)
-    return matched / max(points.shape[0], 1), covariance, degenerate_direction(covariance, half)
+    direction = degenerate_direction(covariance, half)
+    known = covariance_of(hessian / variance, half)
+    step = np.empty(3)
+    for a in range(3):
+        step[a] = (
+            known[a, 0] * gradient[0] + known[a, 1] * gradient[1] + known[a, 2] * gradient[2]
+        ) / variance
+    for a in range(3):
+        for b in range(3):
+            covariance[a, b] += step[a] * step[b]
+    return matched / max(points.shape[0], 1), covariance, direction
 
 
 @kernel
@@ -109,17 +140,34 @@ def degenerate_direction(covariance: NDArray[np.float64], half: NDArray[np.float
 @kernel
 def gather(
     pieces: NDArray[np.float64],
+    tilts: NDArray[np.float64],
     nearest: NDArray[np.uint32],
     frame: NDArray[np.float64],
     points: Points,
     pose: Pose,
     distance: float,
-) -> tuple[int, NDArray[np.float64]]:
-    """Count the points within ``distance`` of the surface, and sum their information (3, 3)."""
+) -> tuple[int, float, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Look at the points within ``distance`` of the surface.
+
+    Returns
+    -------
+    matched : int
+        How many they are.
+    variance : float
+        Of their distances across their lines (m^2), at least that of `RANGE_STD`.
+    hessian : float64 (3, 3)
+        Of half the sum of these distances' squares.
+    feigned : float64 (3, 3)
+        What of it the tilts of the lines add on average, per variance of a return.
+    gradient : float64 (3,)
+        Of half the sum, downhill.
+    """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     x0, y0 = pose[0], pose[1]
     matched = 0
-    squared_residuals = xx = xy = xt = yy = yt = tt = 0.0
+    most = LARGEST_TILT / (RANGE_STD * RANGE_STD)
+    squares = xx = xy = xt = yy = yt = tt = gx = gy = gt = 0.0
+    fxx = fxt = fyt = ftt = 0.0
     for i in range(points.shape[0]):
         rx = c * points[i, 0] - s * points[i, 1]
         ry = s * points[i, 0] + c * points[i, 1]
@@ -130,7 +178,7 @@ def gather(
         matched += 1
         nx, ny = pieces[k, 5], pieces[k, 6]
         residual = nx * x + ny * y - pieces[k, 7]
-        squared_residuals += min(residual * residual, distance * distance)
+        squares += min(residual * residual, distance * distance)
         nt = ny * rx - nx * ry
         xx += nx * nx
         xy += nx * ny
@@ -138,8 +186,17 @@ def gather(
         yy += ny * ny
         yt += ny * nt
         tt += nt * nt
-    information = np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
-    if matched > 0:
-        variance = max(squared_residuals / matched, RANGE_STD * RANGE_STD)
-        information /= variance * CORRELATION
-    return matched, information
+        gx -= nx * residual
+        gy -= ny * residual
+        gt -= nt * residual
+        # A tilt with variance v turns n n' into (1 - v) n n' + v t t', with t along the line; what is to be taken
+        # off is v (n n' + t t'), for then the mean of n n' (1 - v) - v t t' is (1 - 2 v) n n'.
+        tilt = min(tilts[k], most)
+        fxx += tilt
+        fxt -= tilt * ry
+        fyt += tilt * rx
+        ftt += tilt * (rx * rx + ry * ry)
+    hessian = np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
+    feigned = np.array([[fxx, 0.0, fxt], [0.0, fxx, fyt], [fxt, fyt, ftt]])
+    variance = max(squares / max(matched, 1), RANGE_STD * RANGE_STD)
+    return matched, variance, hessian, feigned, np.array([gx, gy, gt])

@@ -56,6 +56,8 @@ class Surface:
         What the distance of a place from a segment and from its line is computed from, side by side in memory: a
         segment's beginning ``ax, ay``, unit direction ``ux, uy`` and length, then the fitted line's unit normal
         and offset, ``nx * x + ny * y = offset``; a lone return's direction and normal are zero.
+    tilts : float64 (S,)
+        Variance of the fitted line's direction, per variance of a return across it (1 / m^2); 0 for a lone return.
     nearest : uint32 (H, W)
         For each cell's centre the nearest segment: see `nearest_segment`.
     frame : float64 (4,)
@@ -64,14 +66,15 @@ class Surface:
 
     segments: NDArray[np.float64]
     pieces: NDArray[np.float64]
+    tilts: NDArray[np.float64]
     nearest: NDArray[np.uint32]
     frame: NDArray[np.float64]
 
     @classmethod
     def build(cls, points: Points) -> Surface:
         """Make the surface of (N, 2) finite points in beam order; scans may follow one another."""
-        segments, pieces = join(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
-        return cls(segments, pieces, *rasterise_nearest(segments, RESOLUTION, REACH))
+        segments, pieces, tilts = join(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
+        return cls(segments, pieces, tilts, *rasterise_nearest(segments, RESOLUTION, REACH))
 
     def extended(self, points: Points) -> Surface:
         """The surface with one more scan's (N, 2) points; takes over this one's raster, which is then void."""
@@ -116,12 +119,13 @@ def bounds(segments: NDArray[np.float64]) -> tuple[float, float, float, float]:
 @kernel
 def join(
     points: Points, gap: float, span: float, roughness: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Segments (S, 4) between neighbouring points closer than ``gap``, and `Surface.pieces` (S, 8)."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Segments (S, 4) between neighbouring points closer than ``gap``, `Surface.pieces` and `Surface.tilts`."""
     n = points.shape[0]
     segments = np.empty((n, 4))
     pieces = np.empty((n, 8))
-    line = np.empty(4)
+    tilts = np.empty(n)
+    line = np.empty(5)
     count = 0
     joined_before = False
     for i in range(n):
@@ -149,16 +153,17 @@ def join(
             pieces[count, 4] = length
             pieces[count, 5], pieces[count, 6] = line[2], line[3]
             pieces[count, 7] = line[2] * line[0] + line[3] * line[1]
+            tilts[count] = line[4]
             count += 1
         joined_before = joined
-    return segments[:count].copy(), pieces[:count].copy()
+    return segments[:count].copy(), pieces[:count].copy(), tilts[:count].copy()
 
 
 @kernel
 def fit_line(
     points: Points, i: int, gap: float, span: float, roughness: float, out: NDArray[np.float64]
 ) -> None:
-    """Fit a line to the points around segment ``i``, ``i + 1``; into ``out`` (4,): point, normal.
+    """Fit a line to the points around segment ``i``, ``i + 1``; into ``out`` (5,): point, normal, tilt.
 
     The stretch grows by a point at each end in turn while it stays connected and within half of ``span`` of
     the segment's middle; with too rough a fit the segment itself is the line.
@@ -204,14 +209,16 @@ def fit_line(
             length = math.sqrt(ux * ux + uy * uy)
             out[0], out[1] = cx, cy
             out[2], out[3] = -uy / length, ux / length
+            out[4] = 1.0 / (half_trace + root)
             return
     dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
     length = math.sqrt(dx * dx + dy * dy)
     out[0], out[1] = mx, my
     if length > 0.0:
         out[2], out[3] = -dy / length, dx / length
+        out[4] = 2.0 / (length * length)
     else:
-        out[2], out[3] = 0.0, 0.0
+        out[2], out[3], out[4] = 0.0, 0.0, 0.0
 
 
 @kernel

@@ -133,9 +133,6 @@ class Estimate:
         Of the pose, if the method has one of its own; else the framework computes one.
     diagnostics : mapping
         Anything else worth knowing; JSON types only.
-    spread : float64 (3,), optional
-        Standard deviations (m, m, rad) of what the method itself leaves undecided, such as a plateau of its
-        fitness; added to the framework's covariance, which knows the returns' noise only.
     """
 
     pose: Pose
@@ -143,7 +140,6 @@ class Estimate:
     evaluations: int = 0
     covariance: NDArray[np.float64] | None = None
     diagnostics: Mapping[str, Any] = field(default_factory=dict)
-    spread: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -303,7 +299,7 @@ class Matcher(ABC, Generic[ConfigT]):
         if not math.isnan(direction):
             diagnostics = {**diagnostics, "degenerate_direction": direction}
         if covariance is None:
-            covariance = estimated if found.spread is None else estimated + np.diag(found.spread**2)
+            covariance = estimated
         return MatchResult(
             pose=pose,
             covariance=covariance,

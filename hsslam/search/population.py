@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import abstractmethod
 from functools import cached_property
 from typing import Any, Generic, TypeVar
@@ -76,17 +75,6 @@ class PopulationReference(Reference):
         )
 
 
-def plateau(points: Points, half_side: float) -> NDArray[np.float64]:
-    """Standard deviations (m, m, rad) of the poses between which a count of hits cannot decide.
-
-    A third of a square's half side, as measured over simulated trials, and the turn that moves the points as
-    far on average.
-    """
-    distance = half_side / 3.0
-    reach = math.sqrt(float((points * points).sum()) / len(points))
-    return np.array([distance, distance, distance / max(reach, half_side)])
-
-
 PopulationConfigT = TypeVar("PopulationConfigT", bound=PopulationConfig)
 
 
@@ -141,8 +129,7 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
         found, hits, evaluations = self.search(fitness, guess, window, rng)
         diagnostics: dict[str, Any] = {"fitness": fitness.share(hits)}
         if not self.config.refine:
-            spread = plateau(points, raster.half_side)
-            return Estimate(found, evaluations=evaluations, spread=spread, diagnostics=diagnostics)
+            return Estimate(found, evaluations=evaluations, diagnostics=diagnostics)
         refined, diagnostics["refine_iterations"] = polish(
             reference, points, found, guess, window, self.config.refine_iterations
         )

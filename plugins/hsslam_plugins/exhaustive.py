@@ -11,7 +11,6 @@ from hsslam.matching import Estimate, Matcher, Points, Pose, Reference, SearchWi
 from hsslam.search import PopulationConfig
 from hsslam.search.exhaustive import ExhaustiveReference, lattice_search, window_search
 from hsslam.search.polish import polish
-from hsslam.search.population import plateau
 
 
 class ExhaustiveConfig(PopulationConfig):
@@ -76,8 +75,7 @@ class Exhaustive(Matcher[ExhaustiveConfig]):
             "proven": proof.bound - proof.fitness <= config.tolerance,
         }
         if not config.refine:
-            spread = plateau(points, reference.raster.half_side)
-            return Estimate(proof.pose, evaluations=proof.evaluations, spread=spread, diagnostics=diagnostics)
+            return Estimate(proof.pose, evaluations=proof.evaluations, diagnostics=diagnostics)
         refined, diagnostics["refine_iterations"] = polish(
             reference, points, proof.pose, guess, window, config.refine_iterations
         )

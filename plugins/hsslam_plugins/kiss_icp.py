@@ -21,10 +21,6 @@ from hsslam_plugins.local import LocalConfig, in_space, planar_pose, transformat
 
 INSTALL = "pip install 'hsslam[kiss-icp]'"
 
-POINT_TO_POINT_SPREAD = np.array([0.01, 0.01, 0.006])
-"""Standard deviations (m, m, rad) of what beams that fall beside one another do to point-to-point distances:
-measured over simulated trials."""
-
 UNLIMITED = 1e6
 """Distance (m) from the origin at which the voxel map would drop points: never."""
 
@@ -135,10 +131,7 @@ class KissIcp(Matcher[KissIcpConfig]):
             (config.distance_end, config.robust_scale_end),
         ):
             matrix = registration.align_points_to_map(scan, reference.voxels, matrix, distance, scale)
-        return Estimate(
-            window.keep(guess, planar_pose(matrix), config.window_slack),
-            spread=POINT_TO_POINT_SPREAD,
-        )
+        return Estimate(window.keep(guess, planar_pose(matrix), config.window_slack))
 
 
 def package() -> Any:
