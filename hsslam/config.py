@@ -164,7 +164,9 @@ class GraphSection(Section):
     overlap_half_xy: float = Field(0.15, gt=0.0, description="half side of the window of such a match (m)")
     overlap_half_theta_deg: float = Field(5.0, gt=0.0, description="half its extent in heading (deg)")
     rescan_keyframes: int = Field(
-        18, ge=0, description="keyframes every scan is matched against once more at the very end (0: not at all)"
+        18,
+        ge=0,
+        description="keyframes every scan is matched against once more at the very end (0: not at all)",
     )
     overlap_min_score: float = Field(
         0.35, ge=0.0, le=1.0, description="share of points such a match must explain"

@@ -78,18 +78,21 @@ class Surface:
 
     def extended(self, points: Points) -> Surface:
         """The surface with one more scan's (N, 2) points; takes over this one's raster, which is then void."""
-        added, pieces = join(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
-        segments, pieces = np.concatenate((self.segments, added)), np.concatenate((self.pieces, pieces))
+        if len(points) == 0:
+            return self
+        added, pieces, tilts = join(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
+        segments = np.concatenate((self.segments, added))
+        pieces, tilts = np.concatenate((self.pieces, pieces)), np.concatenate((self.tilts, tilts))
         left, bottom, right, top = bounds(added)
         low = np.array([left, bottom]) - REACH
         high = np.array([right, top]) + REACH + LANES / self.frame[2]
         room = None
-        if 0 < len(self.segments) and len(segments) < 2 ** int(self.frame[3]):
+        if len(self.segments) > 0 and len(segments) < 2 ** int(self.frame[3]):
             room = make_room(self.nearest, self.frame, low, high, int(EMPTY), MAXIMUM_CELLS_PER_SIDE)
         if room is None:
-            return Surface(segments, pieces, *rasterise_nearest(segments, RESOLUTION, REACH))
+            return Surface(segments, pieces, tilts, *rasterise_nearest(segments, RESOLUTION, REACH))
         add_nearest(segments, len(self.segments), *room, REACH)
-        return Surface(segments, pieces, *room)
+        return Surface(segments, pieces, tilts, *room)
 
 
 @kernel
@@ -237,7 +240,7 @@ def rasterise_nearest(
 ) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
     """Find the segment nearest to each cell's centre: `Surface.nearest` and `Surface.frame`."""
     left, bottom, right, top = bounds(segments)
-    cell = max(resolution, (max(right - left, top - bottom) + 2.0 * reach) / MAXIMUM_CELLS_PER_SIDE)
+    cell = max(resolution, (max(right - left, top - bottom) + 2.0 * reach) / (MAXIMUM_CELLS_PER_SIDE - LANES))
     # The last lanes of a row's last cells must not end up in the next row.
     columns = math.ceil((right - left + 2.0 * reach) / cell) + 1 + LANES
     rows = math.ceil((top - bottom + 2.0 * reach) / cell) + 1

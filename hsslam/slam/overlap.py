@@ -44,9 +44,7 @@ def overlapping_pairs(poses: Poses, radius: float, neighbours: int) -> list[tupl
 
 
 @kernel
-def choose(
-    first: NDArray[np.int64], second: NDArray[np.int64], most: int, spread: int
-) -> NDArray[np.bool_]:
+def choose(first: NDArray[np.int64], second: NDArray[np.int64], most: int, spread: int) -> NDArray[np.bool_]:
     """Which pairs to take, the best of each ``second`` first, no two ``first`` of it nearer than ``spread``."""
     chosen = np.zeros(len(first), dtype=np.bool_)
     start = 0

@@ -137,4 +137,3 @@ def smooth(
     solution = gtsam.LevenbergMarquardtOptimizer(graph, values).optimize()
     out: Poses = gtsam.utilities.extractPose2(solution)
     return out
-
