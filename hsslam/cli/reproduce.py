@@ -24,7 +24,9 @@ _ALL = "all"
 def reproduce(
     what: Annotated[
         str,
-        typer.Argument(metavar="EXPERIMENT", help="table1, table2, fig7, fig8, fig9, fig10, maps or all."),
+        typer.Argument(
+            metavar="EXPERIMENT", help="table1, table2, fig7, fig8, fig9, fig10, maps, benchmarks or all."
+        ),
     ],
     dataset: Annotated[
         str | None,

@@ -10,7 +10,7 @@ from importlib import import_module
 from hsslam.errors import ConfigError
 from hsslam_eval.reproduce.experiment import Experiment, Request, Tell
 
-NAMES = ("table1", "table2", "fig7", "fig8", "fig9", "fig10", "maps")
+NAMES = ("table1", "table2", "fig7", "fig8", "fig9", "fig10", "maps", "benchmarks")
 """Experiments in the paper's order."""
 
 

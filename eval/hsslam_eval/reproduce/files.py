@@ -137,11 +137,13 @@ def paper(cell: Value | str) -> str:
 
 
 def number(value: float) -> str:
-    """Three significant digits, more before the point; a dash where there is no figure."""
+    """Three significant digits, more before the point, powers of ten far from 1; a dash where there is no figure."""
     if not math.isfinite(value):
         return "–"  # noqa: RUF001
     if value == 0.0:
         return "0"
+    if not 1e-4 <= abs(value) < 1e6:
+        return f"{value:.1e}"
     digits = min(max(0, 2 - math.floor(math.log10(abs(value)))), 5)
     text = f"{value:.{digits}f}"
     return text.removesuffix(".0") if abs(value) >= 100.0 else text
