@@ -49,7 +49,7 @@ def test_reproduce_quiet_prints_nothing_and_makes_its_own_folder() -> None:
 def test_reproduce_of_an_unknown_experiment_or_log_is_one_line() -> None:
     unknown = hsslam("reproduce", "fig99")
     assert unknown.exit_code == 2
-    assert "fig10, maps and all" in unknown.stderr
+    assert "fig10, maps, benchmarks and all" in unknown.stderr
     missing = hsslam("reproduce", "fig10", "--dataset", "nowhere.clf", "--out", "out")
     assert missing.exit_code == 3
     assert len(missing.stderr.strip().splitlines()) == 1

@@ -99,7 +99,13 @@ class BenchmarksResult:
 
     def against(self, early: bool = False) -> dict[str, dict[Problem, Comparison]]:
         """HIDE against each other search on each problem, paired by run; all tests are one family for Holm."""
-        errors = self.early if early else self.finals
+        return self._tests[early]
+
+    @cached_property
+    def _tests(self) -> dict[bool, dict[str, dict[Problem, Comparison]]]:
+        return {early: self._test(errors) for early, errors in ((False, self.finals), (True, self.early))}
+
+    def _test(self, errors: dict[Problem, Floats]) -> dict[str, dict[Problem, Comparison]]:
         keys = [(other.label, problem) for other in self.others for problem in self.problems]
         tests = compare_all([(self._of(errors, p, HIDE), self._of(errors, p, label)) for label, p in keys])
         out: dict[str, dict[Problem, Comparison]] = {other.label: {} for other in self.others}

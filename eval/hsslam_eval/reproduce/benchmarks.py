@@ -88,9 +88,11 @@ def claims(result: BenchmarksResult) -> tuple[Claim, ...]:
     final, early = result.overall(), result.overall(early=True)
     each, each_early = result.against(), result.against(early=True)
 
+    enough = fewest_pairs(len(result.others))
+
     def better(label: str, added: bool = False) -> Claim:
         statement = f"HIDE finds better minima than {label}."
-        return _claim(statement, final[label], each[label], label, _WHOLE, added)
+        return _claim(statement, final[label], each[label], label, _WHOLE, enough, added)
 
     found = [better(other.label) for other in result.others if not other.added]
     evolutions = [other.label for other in result.others if (other.method or "").startswith("de")]
@@ -98,10 +100,10 @@ def claims(result: BenchmarksResult) -> tuple[Claim, ...]:
     for label in evolutions:
         some = {p: c for p, c in each[label].items() if p.function.local_minima}
         statement = f"Where there are many local minima, HIDE gets stuck less than {label}: it ends lower."
-        found.append(_claim(statement, escapes[label], some, label, _WHOLE))
+        found.append(_claim(statement, escapes[label], some, label, _WHOLE, enough))
     harmonies = [other.label for other in result.others if other.method in ("harmony", "ihs")]
     found += [
-        _claim(f"HIDE converges faster than {label}.", early[label], each_early[label], label, _TENTH)
+        _claim(f"HIDE converges faster than {label}.", early[label], each_early[label], label, _TENTH, enough)
         for label in harmonies
     ]
     found += [better(other.label, added=True) for other in result.others if other.added]
@@ -114,6 +116,7 @@ def _claim(
     each: dict[Problem, Comparison],
     label: str,
     when: str,
+    enough: int,
     added: bool = False,
 ) -> Claim:
     better, same, worse = _counts(each)
@@ -124,6 +127,8 @@ def _claim(
         f"median error of HIDE is {10.0**overall.difference:.2g} times that of {label} at the median (signed-rank test "
         f"over problems: p = {overall.corrected:.2g})."
     )
+    if len(each) < enough:
+        return Claim(statement, "cannot be compared", f"{why} The test needs {enough} problems.", added)
     return Claim(statement, "holds" if overall.verdict < 0 else "does not hold", why, added)
 
 
