@@ -169,8 +169,8 @@ def _notes(result: BenchmarksResult) -> tuple[str, ...]:
         f"follow the share of the budget spent, so {_TENTH} IHS and HIDE are still set to explore.",
         "Sphere, Rastrigin and Schwefel are sums over the variables, and Ackley and Griewank nearly so, which suits "
         "harmony search, since it takes every variable from another harmony; Rosenbrock's variables hang together.",
-        "Sphere, Rastrigin, Ackley and Griewank have their minimum at the origin, which is where equation 11 would pull "
-        "every member, were its L not 1.",
+        "Sphere, Rastrigin, Ackley and Griewank have their minimum at the origin, which is where equation 11 would "
+        "pull every member, were its L not 1.",
         "The tests over problems treat numbers of variables of one function as independent, which they are not quite.",
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,9 +55,11 @@ class Bout:
     optima: Optima | None
 
 
-def fight(
-    request: Request, methods: Sequence[Method], pairs: PairSet, count: int, tell: Tell
-) -> dict[tuple[str, float], Bout]:
+Bouts: TypeAlias = Mapping[tuple[str, float], Bout]
+"""By the method's label and the side of the window (m)."""
+
+
+def fight(request: Request, methods: Sequence[Method], pairs: PairSet, count: int, tell: Tell) -> Bouts:
     """Run every method over every window on the same pairs with the same guesses.
 
     The methods take turns trial by trial, so that whatever else the machine does slows them all alike.
@@ -81,7 +83,7 @@ def fight(
 
 
 def table(
-    bouts: Mapping[tuple[str, float], Bout],
+    bouts: Bouts,
     paper: Mapping[tuple[str, float], Published],
     pairs: PairSet,
     methods: Sequence[Method],
@@ -131,25 +133,21 @@ def _cells(bout: Bout, paper: Mapping[tuple[str, float], Published], judged: boo
 
 
 def success(
-    bouts: Mapping[tuple[str, float], Bout], first: str, second: str, side: float
+    bouts: Bouts, first: str, second: str, side: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Which trials two methods succeeded in by the GLASM authors' limits, 0 or 1, (T,) each."""
     a, b = (strict_success(bouts[label, side].result).astype(np.float64) for label in (first, second))
     return a, b
 
 
-def errors(
-    bouts: Mapping[tuple[str, float], Bout], first: str, second: str, side: float, quantity: str
-) -> Interval:
+def errors(bouts: Bouts, first: str, second: str, side: float, quantity: str) -> Interval:
     """Mean of first minus second of ``displacement`` (m) or ``rotation`` (rad) where both succeed."""
     a, b = bouts[first, side].result, bouts[second, side].result
     both = strict_success(a) & strict_success(b)
     return paired(getattr(a, quantity)[both], getattr(b, quantity)[both])
 
 
-def speed_claim(
-    bouts: Mapping[tuple[str, float], Bout], first: str, second: str, side: float, at: str, paper: float
-) -> Claim:
+def speed_claim(bouts: Bouts, first: str, second: str, side: float, at: str, paper: float) -> Claim:
     """Judge that ``first`` takes less time than ``second``; ``paper`` is its ratio of times."""
     a, b = bouts[first, side].result, bouts[second, side].result
     claim = compare(

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 
 from hsslam_eval.reproduce.data import PairSet
 from hsslam_eval.reproduce.drawing import GREY, panels
-from hsslam_eval.reproduce.duel import SIDES, Bout, Published
+from hsslam_eval.reproduce.duel import SIDES, Bouts, Published
 from hsslam_eval.reproduce.experiment import Drawing, Value
 from hsslam_eval.reproduce.methods import Method
 
@@ -18,7 +18,7 @@ _COLOURS = {0.20: "#0072b2", 0.30: "#d55e00"}
 
 
 def draw(
-    bouts: Mapping[tuple[str, float], Bout],
+    bouts: Bouts,
     paper: Mapping[tuple[str, float], Published],
     methods: Sequence[Method],
     pairs: PairSet,

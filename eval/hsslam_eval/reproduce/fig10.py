@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam_eval.reproduce import drawing, methods
-from hsslam_eval.reproduce.data import PairSet, attribution, describe, pair_sets, trial_config
+from hsslam_eval.reproduce.data import PairSet, pair_sets, trial_config
 from hsslam_eval.reproduce.experiment import Claim, Drawing, Experiment, Request, Row, Table, Tell, Value
+from hsslam_eval.reproduce.findings import Findings
 from hsslam_eval.reproduce.judge import compare, paired
 from hsslam_eval.reproduce.traces import trace_trials
 from hsslam_eval.statistics import bootstrap_interval
@@ -31,8 +32,7 @@ def run(request: Request, tell: Tell) -> Experiment:
         methods.published("hide", evaluations=BUDGET),
     ]
     shipped = methods.ours("hide")
-    tables, drawings, claims = [], [], []
-    series = {}
+    found = Findings(request)
     for pairs in pair_sets(request, count):
         config = trial_config(request, count)
         total = methods.MEMORY_SIZE + BUDGET
@@ -48,31 +48,24 @@ def run(request: Request, tell: Tell) -> Experiment:
             lambda done, of: tell(shipped.label, done, of),
         )
         answer = Value.of(bootstrap_interval(final.displacement, seed=request.seed), 100.0)
-        tables.append(_table(errors, answer, pairs, request.seed))
-        drawings.append(_draw(errors, answer.value, pairs))
-        claims += [_ahead(errors, place, pairs.key) for place in PLACES[1:]]
-        series[pairs.key] = {
+        found.tables.append(_table(errors, answer, pairs, request.seed))
+        found.drawings.append(_draw(errors, answer.value, pairs))
+        found.claims += [_ahead(errors, place, pairs.key) for place in PLACES[1:]]
+        found.series[pairs.key] = {
             label: np.round(100.0 * error.mean(axis=0), 4).tolist() for label, error in errors.items()
         }
-    return Experiment(
-        name="fig10",
-        title="Figure 10: convergence of HSL and HIDE",
+    return found.experiment(
+        "fig10",
+        "Figure 10: convergence of HSL and HIDE",
         summary="Displacement error of the best pose so far over fitness evaluations, both methods as published but "
         f"with the same budget ({BUDGET} evaluations after the {methods.MEMORY_SIZE} that fill the memory), from the "
         "same guesses, L = 30 cm; mean over all trials, failures included.",
-        claims=tuple(claims),
-        tables=tuple(tables),
-        drawings=tuple(drawings),
-        data=describe(request),
-        attribution=attribution(request),
-        seeds=(request.seed,),
         counts={"trials per method": count, "evaluations per trial": methods.MEMORY_SIZE + BUDGET},
         config={each.label: each.described() for each in (*contestants, shipped)},
         notes=(
             "The paper draws one population; a single run says little of a random search, so ours is the mean of "
             "many.",
         ),
-        series=series,
     )
 
 

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam_eval.reproduce import drawing, methods
-from hsslam_eval.reproduce.data import PairSet, attribution, describe, pair_sets, trial_config
+from hsslam_eval.reproduce.data import PairSet, pair_sets, trial_config
 from hsslam_eval.reproduce.experiment import Claim, Drawing, Experiment, Request, Row, Table, Tell, Value
+from hsslam_eval.reproduce.findings import Findings
 from hsslam_eval.reproduce.judge import paired
 from hsslam_eval.reproduce.traces import trace_trials
 from hsslam_eval.statistics import Interval, bootstrap_interval
@@ -26,8 +27,7 @@ Errors = dict[tuple[int, float], NDArray[np.float64]]
 def run(request: Request, tell: Tell) -> Experiment:
     """Redo Figure 7; see `hsslam_eval.reproduce`."""
     count = request.count(500, 40)
-    tables, drawings, claims = [], [], []
-    series = {}
+    found = Findings(request)
     for pairs in pair_sets(request, count):
         errors: Errors = {}
         evolution: dict[str, NDArray[np.float64]] = {}
@@ -42,21 +42,15 @@ def run(request: Request, tell: Tell) -> Experiment:
                 if budget == PUBLISHED_BUDGET:
                     evolution[f"HMCR {rate:g}"] = 100.0 * traces.displacement.mean(axis=0)
         values = {key: Value.of(bootstrap_interval(e, seed=request.seed), 100.0) for key, e in errors.items()}
-        tables.append(_table(values, pairs, len(pairs.pairs)))
-        drawings.append(_draw(values, evolution, pairs))
-        claims += [_least_at_published(errors, pairs.key), _more_helps(errors, pairs.key)]
-        series[pairs.key] = {label: np.round(line, 4).tolist() for label, line in evolution.items()}
-    return Experiment(
-        name="fig7",
-        title="Figure 7: memory considering rate (HMCR)",
+        found.tables.append(_table(values, pairs, len(pairs.pairs)))
+        found.drawings.append(_draw(values, evolution, pairs))
+        found.claims += [_least_at_published(errors, pairs.key), _more_helps(errors, pairs.key)]
+        found.series[pairs.key] = {label: np.round(line, 4).tolist() for label, line in evolution.items()}
+    return found.experiment(
+        "fig7",
+        "Figure 7: memory considering rate (HMCR)",
         summary="HSL as published but for HMCR and the number of improvisations: displacement error of the best "
         "harmony over fitness evaluations, and at the end, L = 30 cm. The mean is over all trials, failures included.",
-        claims=tuple(claims),
-        tables=tuple(tables),
-        drawings=tuple(drawings),
-        data=describe(request),
-        attribution=attribution(request),
-        seeds=(request.seed,),
         counts={"trials per setting": count},
         config={
             "rates": list(RATES),
@@ -68,7 +62,6 @@ def run(request: Request, tell: Tell) -> Experiment:
             "Pitch adjustment and bandwidth follow the share of the budget that is spent, so the first 50 evaluations "
             "of a run of 250 are not a run of 50.",
         ),
-        series=series,
     )
 
 
@@ -115,8 +108,19 @@ def _draw(
     right.set_xlabel("HMCR")
     right.set_ylabel("mean displacement error at the end (cm)")
     right.set_ylim(bottom=0.0)
-    for axes in (left, right):
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, frameon=False, handlelength=3.2)
+    for axes, columns in ((left, 3), (right, 2)):
+        # Matplotlib lists lines before error bars; the published rate is a remark, so it comes last.
+        entries = sorted(
+            zip(*axes.get_legend_handles_labels(), strict=True), key=lambda e: e[1].startswith("published")
+        )
+        axes.legend(
+            *zip(*entries, strict=True),
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.16),
+            ncols=columns,
+            frameon=False,
+            handlelength=3.2,
+        )
     return Drawing(
         f"figure-{pairs.key}",
         f"{pairs.label}. Left: mean displacement error of the best harmony over evaluations, by HMCR. Right: at the "

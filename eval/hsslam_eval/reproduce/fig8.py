@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam_eval.reproduce import drawing, methods
-from hsslam_eval.reproduce.data import PairSet, attribution, describe, pair_sets, trial_config
+from hsslam_eval.reproduce.data import PairSet, pair_sets, trial_config
 from hsslam_eval.reproduce.experiment import Claim, Drawing, Experiment, Request, Row, Table, Tell, Value
+from hsslam_eval.reproduce.findings import Findings
 from hsslam_eval.reproduce.judge import compare, paired
 from hsslam_eval.reproduce.traces import trace_trials
 from hsslam_eval.statistics import bootstrap_interval
@@ -26,8 +27,7 @@ Fitness = dict[tuple[int, int], NDArray[np.float64]]
 def run(request: Request, tell: Tell) -> Experiment:
     """Redo Figure 8; see `hsslam_eval.reproduce`."""
     count = request.count(500, 40)
-    tables, drawings, claims = [], [], []
-    series = {}
+    found = Findings(request)
     for pairs in pair_sets(request, count):
         config = trial_config(request, count)
         fitness: Fitness = {}
@@ -36,29 +36,22 @@ def run(request: Request, tell: Tell) -> Experiment:
                 label = f"HMS {size}, {total} evaluations, {pairs.key}"
                 method = methods.published("hsl", label, memory_size=size, improvisations=total - size)
                 fitness[total, size] = trace_trials(method, pairs.pairs, config, total, tell).fitness
-        tables.append(_table(fitness, pairs, request.seed))
-        drawings.append(_draw(fitness, pairs))
-        claims += _claims(fitness, pairs.key)
-        series[pairs.key] = {
+        found.tables.append(_table(fitness, pairs, request.seed))
+        found.drawings.append(_draw(fitness, pairs))
+        found.claims += _claims(fitness, pairs.key)
+        found.series[pairs.key] = {
             f"HMS {size}, {total} evaluations": np.round(100.0 * f.mean(axis=0), 4).tolist()
             for (total, size), f in fitness.items()
         }
-    return Experiment(
-        name="fig8",
-        title="Figure 8: size of the harmony memory (HMS)",
+    return found.experiment(
+        "fig8",
+        "Figure 8: size of the harmony memory (HMS)",
         summary="HSL as published but for HMS: best fitness (share of the scan's points that hit a square) over "
         f"fitness evaluations, L = 30 cm. Runs of {SHORT} evaluations, which is what the published settings spend, "
         f"and of {LONG}; the evaluations that fill the memory count, so a larger memory leaves fewer improvisations.",
-        claims=tuple(claims),
-        tables=tuple(tables),
-        drawings=tuple(drawings),
-        data=describe(request),
-        attribution=attribution(request),
-        seeds=(request.seed,),
         counts={"trials per setting": count},
         config={"sizes": list(SIZES), "evaluations": [SHORT, LONG], **methods.published("hsl").described()},
         notes=("The paper prints no figures beside the plot; only what its text says can be judged.",),
-        series=series,
     )
 
 

@@ -11,14 +11,13 @@ from hsslam_eval.reproduce import drawing, methods
 from hsslam_eval.reproduce.data import (
     PairSet,
     add_noise,
-    attribution,
-    describe,
     is_simulated,
     pair_sets,
     trial_config,
 )
 from hsslam_eval.reproduce.duel import strict_success
 from hsslam_eval.reproduce.experiment import Claim, Drawing, Experiment, Request, Row, Table, Tell, Value
+from hsslam_eval.reproduce.findings import Findings
 from hsslam_eval.reproduce.judge import no_worse, paired
 from hsslam_eval.statistics import bootstrap_interval, wilson_interval
 from hsslam_eval.trials import TrialResult, run_trials
@@ -36,7 +35,7 @@ def run(request: Request, tell: Tell) -> Experiment:
     """Redo Figure 9; see `hsslam_eval.reproduce`."""
     count = request.count(500, 40)
     contestants = [methods.published("hsl"), methods.published("hide"), methods.ours("hide")]
-    tables, drawings, claims = [], [], []
+    found = Findings(request)
     remarks: list[str] = []
     for pairs in pair_sets(request, count, noiseless=True):
         results: Results = {}
@@ -53,13 +52,13 @@ def run(request: Request, tell: Tell) -> Experiment:
                     lambda done, of, label=label: tell(label, done, of),  # type: ignore[misc]
                 )
         labels = [method.label for method in contestants]
-        tables += [_errors(results, labels, pairs, request.seed), _successes(results, labels, pairs)]
-        drawings.append(_draw(results, labels, pairs, request.seed))
-        claims += [_graceful(results, label, pairs.key) for label in ("HSL", "HIDE")]
+        found.tables += [_errors(results, labels, pairs, request.seed), _successes(results, labels, pairs)]
+        found.drawings.append(_draw(results, labels, pairs, request.seed))
+        found.claims += [_graceful(results, label, pairs.key) for label in ("HSL", "HIDE")]
         remarks += [_dip(results, label, pairs.key) for label in ("HSL", "HIDE")]
-    return Experiment(
-        name="fig9",
-        title="Figure 9: noise of the sensor",
+    return found.experiment(
+        "fig9",
+        "Figure 9: noise of the sensor",
         summary="HSL and HIDE as published, and hide as hsslam ships it, on the same pairs of scans with more and more "
         "Gaussian noise along the beams of both scans, L = 30 cm. "
         + (
@@ -67,12 +66,6 @@ def run(request: Request, tell: Tell) -> Experiment:
             if is_simulated(request)
             else "The noise comes on top of the laser's own."
         ),
-        claims=tuple(claims),
-        tables=tuple(tables),
-        drawings=tuple(drawings),
-        data=describe(request),
-        attribution=attribution(request),
-        seeds=(request.seed,),
         counts={"trials per method and noise": count},
         config={"noise_m": list(NOISE), **{each.label: each.described() for each in contestants}},
         notes=(

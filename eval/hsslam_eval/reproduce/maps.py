@@ -240,6 +240,8 @@ def _draw(found: list[Mapped], request: Request) -> Drawing:
         panel.set_xlim(x0, x1)
         panel.set_ylim(y0, y1)
         panel.set_title(_TITLES.get(way.label, way.label))
+    for panel in axes[:2]:
+        panel.set_xlabel("")
     return Drawing(
         "figure",
         f"Maps of {describe(request)}, all at one scale: black is occupied, white free, grey unknown.",

@@ -6,9 +6,8 @@ import math
 from dataclasses import replace
 
 from hsslam_eval.reproduce import duel, methods
-from hsslam_eval.reproduce.data import attribution, describe, pair_sets
-from hsslam_eval.reproduce.duel import Bout, Published
-from hsslam_eval.reproduce.duel_figure import draw
+from hsslam_eval.reproduce.duel import Bouts, Published
+from hsslam_eval.reproduce.duel_experiment import hold
 from hsslam_eval.reproduce.experiment import Claim, Experiment, Request, Tell
 from hsslam_eval.reproduce.judge import compare, paired
 
@@ -28,7 +27,6 @@ _TIMES = {0.20: 158.0 / 165.0, 0.30: 252.0 / 273.0}
 
 def run(request: Request, tell: Tell) -> Experiment:
     """Redo Table 1; see `hsslam_eval.reproduce`."""
-    count = request.count(1000, 60)
     contestants = [
         methods.published("glasm"),
         methods.published("hsl"),
@@ -40,31 +38,17 @@ def run(request: Request, tell: Tell) -> Experiment:
         ),
         methods.ours("hsl"),
     ]
-    tables, drawings, claims = [], [], []
-    for pairs in pair_sets(request, count):
-        bouts = duel.fight(request, contestants, pairs, count, tell)
-        tables.append(duel.table(bouts, PAPER, pairs, contestants))
-        drawings.append(draw(bouts, PAPER, contestants, pairs))
-        for side in duel.SIDES:
-            claims += _claims(bouts, side, pairs.key)
-        claims.append(_depends_on_window(bouts, pairs.key, "GLASM"))
-        for side in duel.SIDES:
-            claims += [replace(claim, added=True) for claim in _at_equal_evaluations(bouts, side, pairs.key)]
-        claims.append(replace(_depends_on_window(bouts, pairs.key, _FEW), added=True))
-    return Experiment(
+    return hold(
+        request,
+        tell,
+        contestants,
+        PAPER,
+        _claims,
         name="table1",
         title="Table 1: GLASM against HSL",
         summary="The genetic search and harmony search, both as published and on the same fitness (squares of 10.5 cm "
         "around the reference's points), from the same guesses; then HSL with as many evaluations as GLASM spends, "
         "and GLASM with as many as HSL; then HSL as hsslam ships it.",
-        claims=tuple(claims),
-        tables=tuple(tables),
-        drawings=tuple(drawings),
-        data=describe(request),
-        attribution=attribution(request),
-        seeds=(request.seed,),
-        counts={"trials per method and window": count},
-        config=duel.described(contestants),
         notes=(
             "The paper gives neither the number of its trials nor its threshold of success; ours is the GLASM "
             "authors' (10 cm and 0.01 rad).",
@@ -75,67 +59,66 @@ def run(request: Request, tell: Tell) -> Experiment:
     )
 
 
-def _claims(bouts: dict[tuple[str, float], Bout], side: float, key: str) -> list[Claim]:
-    at = f"L = {100 * side:.0f} cm, {key}"
-    names: dict[str, str] = {"this": "HSL", "other": "GLASM"}
+def _claims(bouts: Bouts, key: str) -> list[Claim]:
+    """Judge the paper's claims; then, as our addition, the same at equal evaluations."""
+    added = [claim for side in duel.SIDES for claim in _at_equal_evaluations(bouts, side, key)]
+    added.append(_depends_on_window(bouts, key, _FEW))
     return [
-        compare(
-            f"{at}: HSL succeeds more often than GLASM.",
-            paired(*duel.success(bouts, "HSL", "GLASM", side)),
-            "larger",
-            what="success ratio (10 cm, 0.01 rad)",
-            unit="points",
-            scale=100.0,
-            **names,
-        ),
-        compare(
-            f"{at}: HSL has the smaller displacement error.",
-            duel.errors(bouts, "HSL", "GLASM", side, "displacement"),
-            "smaller",
-            what="mean displacement error where both succeed",
-            unit="cm",
-            scale=100.0,
-            **names,
-        ),
+        *(claim for side in duel.SIDES for claim in _as_published(bouts, side, key)),
+        _depends_on_window(bouts, key, "GLASM"),
+        *(replace(claim, added=True) for claim in added),
+    ]
+
+
+def _as_published(bouts: Bouts, side: float, key: str) -> list[Claim]:
+    at = f"L = {100 * side:.0f} cm, {key}"
+    return [
+        *_ahead(bouts, side, at, "GLASM"),
         compare(
             f"{at}: HSL has the smaller rotation error.",
             duel.errors(bouts, "HSL", "GLASM", side, "rotation"),
             "smaller",
+            this="HSL",
+            other="GLASM",
             what="mean rotation error where both succeed",
             unit="°",
             scale=math.degrees(1.0),
-            **names,
         ),
         duel.speed_claim(bouts, "HSL", "GLASM", side, at, _TIMES[side]),
     ]
 
 
-def _at_equal_evaluations(bouts: dict[tuple[str, float], Bout], side: float, key: str) -> list[Claim]:
-    at = f"L = {100 * side:.0f} cm, {key}"
-    names: dict[str, str] = {"this": "HSL", "other": "GLASM"}
+def _at_equal_evaluations(bouts: Bouts, side: float, key: str) -> list[Claim]:
+    return _ahead(bouts, side, f"L = {100 * side:.0f} cm, {key}, {_ADDED}", _FEW)
+
+
+def _ahead(bouts: Bouts, side: float, at: str, glasm: str) -> list[Claim]:
+    """Judge that HSL succeeds more often than a GLASM, and is more accurate."""
     return [
         compare(
-            f"{at}, {_ADDED}: HSL succeeds more often than GLASM.",
-            paired(*duel.success(bouts, "HSL", _FEW, side)),
+            f"{at}: HSL succeeds more often than GLASM.",
+            paired(*duel.success(bouts, "HSL", glasm, side)),
             "larger",
+            this="HSL",
+            other="GLASM",
             what="success ratio (10 cm, 0.01 rad)",
             unit="points",
             scale=100.0,
-            **names,
         ),
         compare(
-            f"{at}, {_ADDED}: HSL has the smaller displacement error.",
-            duel.errors(bouts, "HSL", _FEW, side, "displacement"),
+            f"{at}: HSL has the smaller displacement error.",
+            duel.errors(bouts, "HSL", glasm, side, "displacement"),
             "smaller",
+            this="HSL",
+            other="GLASM",
             what="mean displacement error where both succeed",
             unit="cm",
             scale=100.0,
-            **names,
         ),
     ]
 
 
-def _depends_on_window(bouts: dict[tuple[str, float], Bout], key: str, glasm: str) -> Claim:
+def _depends_on_window(bouts: Bouts, key: str, glasm: str) -> Claim:
     """Judge that a wider window costs GLASM success and HSL hardly any."""
     small, large = duel.SIDES
     lost = {

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from hsslam_eval.reproduce import duel, methods
-from hsslam_eval.reproduce.data import attribution, describe, pair_sets
-from hsslam_eval.reproduce.duel import Bout, Published
-from hsslam_eval.reproduce.duel_figure import draw
+from hsslam_eval.reproduce.duel import Bouts, Published
+from hsslam_eval.reproduce.duel_experiment import hold
 from hsslam_eval.reproduce.experiment import Claim, Experiment, Request, Tell
 from hsslam_eval.reproduce.judge import no_worse, paired
 
@@ -27,7 +26,6 @@ DISPLACEMENT_MARGIN = 0.001
 
 def run(request: Request, tell: Tell) -> Experiment:
     """Redo Table 2; see `hsslam_eval.reproduce`."""
-    count = request.count(1000, 60)
     contestants = [
         methods.published("hsl"),
         methods.published("hide"),
@@ -35,26 +33,17 @@ def run(request: Request, tell: Tell) -> Experiment:
         methods.ours("hsl"),
         methods.ours("hide"),
     ]
-    tables, drawings, claims = [], [], []
-    for pairs in pair_sets(request, count):
-        bouts = duel.fight(request, contestants, pairs, count, tell)
-        tables.append(duel.table(bouts, PAPER, pairs, contestants))
-        drawings.append(draw(bouts, PAPER, contestants, pairs))
-        claims += [claim for side in duel.SIDES for claim in _claims(bouts, side, pairs.key)]
-    return Experiment(
+    return hold(
+        request,
+        tell,
+        contestants,
+        PAPER,
+        _claims,
         name="table2",
         title="Table 2: HSL against HIDE",
         summary="Harmony search and its hybrid with differential evolution, both as published (HSL 250 evaluations, "
         "HIDE 220, each after the 30 that fill the memory), on the same fitness and from the same guesses; then "
         "HIDE with HSL's number of evaluations; then both as hsslam ships them.",
-        claims=tuple(claims),
-        tables=tuple(tables),
-        drawings=tuple(drawings),
-        data=describe(request),
-        attribution=attribution(request),
-        seeds=(request.seed,),
-        counts={"trials per method and window": count},
-        config=duel.described(contestants),
         notes=(
             "The paper claims that HIDE outperforms HSL; by its own Table 2 the gain is in time alone, and success is "
             "a point lower.",
@@ -63,7 +52,11 @@ def run(request: Request, tell: Tell) -> Experiment:
     )
 
 
-def _claims(bouts: dict[tuple[str, float], Bout], side: float, key: str) -> list[Claim]:
+def _claims(bouts: Bouts, key: str) -> list[Claim]:
+    return [claim for side in duel.SIDES for claim in _over_window(bouts, side, key)]
+
+
+def _over_window(bouts: Bouts, side: float, key: str) -> list[Claim]:
     at = f"L = {100 * side:.0f} cm, {key}"
     hide, hsl = duel.success(bouts, "HIDE", "HSL", side)
     return [
