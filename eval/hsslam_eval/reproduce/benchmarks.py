@@ -181,7 +181,7 @@ def _comparison_table(result: BenchmarksResult, early: bool) -> Table:
     for label in (other.label for other in result.others):
         counts = (str(count) for count in _counts(each[label]))
         figures = (Value(10.0 ** overall[label].difference), Value(overall[label].corrected))
-        rows.append(Row(f"{HIDE} against {label}", (*counts, *figures)))
+        rows.append(Row(label, (*counts, *figures)))
     return Table(
         f"HIDE against each, {_TENTH if early else _WHOLE}",
         f"Problems ({len(result.problems)}) on which HIDE's error is better, not to be told apart, or worse: "
@@ -191,7 +191,7 @@ def _comparison_table(result: BenchmarksResult, early: bool) -> Table:
         "problems, corrected likewise.",
         ("HIDE better", "no difference", "HIDE worse", "ratio of errors", "p over problems"),
         tuple(rows),
-        corner="pair",
+        corner=f"{HIDE} against",
     )
 
 
