@@ -25,23 +25,36 @@ class ConfigError(HsslamError):
     exit_code = 2
 
 
-class MatcherUnavailableError(HsslamError):
-    """A matcher cannot run here.
+class UnavailableError(HsslamError):
+    """A part that a plugin or an extra brings cannot be used here.
 
     Parameters
     ----------
     name : str
-        The matcher's registered name.
+        The name it is registered under.
     reason : str
         What is missing or broken.
     remedy : str
         The line to type that mends it.
+    kind : str
+        What it is: a matcher, a reader.
     """
 
     exit_code = 4
 
-    def __init__(self, name: str, reason: str, remedy: str) -> None:
+    def __init__(self, name: str, reason: str, remedy: str, kind: str) -> None:
         self.name = name
         self.reason = reason
         self.remedy = remedy
-        super().__init__(f"matcher {name!r} is unavailable: {reason}; mend it with: {remedy}")
+        self.kind = kind
+        super().__init__(f"{kind} {name!r} is unavailable: {reason}; mend it with: {remedy}")
+
+    def __reduce__(self) -> tuple[type[UnavailableError], tuple[str, ...]]:
+        return type(self), (self.name, self.reason, self.remedy, self.kind)
+
+
+class MatcherUnavailableError(UnavailableError):
+    """A matcher cannot run here; see `UnavailableError`."""
+
+    def __init__(self, name: str, reason: str, remedy: str, kind: str = "matcher") -> None:
+        super().__init__(name, reason, remedy, kind)

@@ -1,22 +1,40 @@
-"""Which matchers there are: entry points in the group ``hsslam.matchers``, loaded when asked for."""
+"""Which matchers there are: entry points in the group ``hsslam.matchers``, plugin files, registered classes."""
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Mapping
+import inspect
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
+from types import ModuleType
 from typing import Any
 
 from pydantic import ValidationError
 
-from hsslam.errors import ConfigError, HsslamError, MatcherUnavailableError
+from hsslam.errors import ConfigError, HsslamError, MatcherUnavailableError, UnavailableError
 from hsslam.matching.interface import Matcher
+from hsslam.registry import Registry
 from hsslam.validation import explain
 
 GROUP = "hsslam.matchers"
 
-_registered: dict[str, type[Matcher[Any]]] = {}
+
+def _fault(part: Any) -> str:
+    if isinstance(part, type) and issubclass(part, Matcher):
+        return ""
+    return "is not a subclass of hsslam.matching.Matcher"
+
+
+def _defined_in(module: ModuleType) -> Iterator[tuple[str, type[Matcher[Any]]]]:
+    """Yield the matchers that a plugin file defines, by their classes' names in snake case."""
+    for name, found in vars(module).items():
+        if isinstance(found, type) and issubclass(found, Matcher) and found.__module__ == module.__name__:
+            if name.startswith("_") or inspect.isabstract(found):
+                continue
+            yield re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower(), found
+
+
+_matchers: Registry[type[Matcher[Any]]] = Registry("matcher", GROUP, fault=_fault, discover=_defined_in)
 
 
 @dataclass(frozen=True)
@@ -28,7 +46,7 @@ class MatcherInfo:
     name : str
         What a config calls it.
     origin : str
-        The distribution that declares it, or ``registered`` for one made known with `register`.
+        The distribution or the file that it comes from, or ``registered`` for one made known with `register`.
     available : bool
         Whether it runs here.
     summary : str
@@ -51,16 +69,14 @@ def register(name: str, matcher: type[Matcher[Any]]) -> None:
     Raises
     ------
     ConfigError
-        If the name is taken by another matcher.
+        If the name is taken by another matcher, or this is none.
     """
-    if name in _entry_points() or _registered.get(name, matcher) is not matcher:
-        raise ConfigError(f"a matcher named {name!r} exists already; give yours another name")
-    _registered[name] = matcher
+    _matchers.register(name, matcher)
 
 
 def names() -> list[str]:
-    """Names of all matchers, sorted, whether they run here or not; nothing is imported."""
-    return sorted({*_entry_points(), *_registered})
+    """Names of all matchers, sorted, whether they run here or not; no package's module is imported."""
+    return _matchers.names()
 
 
 def load(name: str) -> type[Matcher[Any]]:
@@ -73,24 +89,10 @@ def load(name: str) -> type[Matcher[Any]]:
     MatcherUnavailableError
         Its module cannot be imported, or is no matcher.
     """
-    if name in _registered:
-        return _registered[name]
-    declared = _entry_points().get(name)
-    if declared is None:
-        close = difflib.get_close_matches(name, names(), n=1)
-        hint = f"; did you mean {close[0]!r}?" if close else ""
-        raise ConfigError(f"no matcher is named {name!r}{hint} (there are: {', '.join(names())})")
     try:
-        loaded = declared.load()
-    except Exception as error:
-        raise MatcherUnavailableError(
-            name, f"{type(error).__name__}: {error}", _reinstall(declared)
-        ) from error
-    if not (isinstance(loaded, type) and issubclass(loaded, Matcher)):
-        raise MatcherUnavailableError(
-            name, f"{declared.value} is not a subclass of hsslam.matching.Matcher", _reinstall(declared)
-        )
-    return loaded
+        return _matchers.load(name)
+    except UnavailableError as error:
+        raise MatcherUnavailableError(error.name, error.reason, error.remedy) from error
 
 
 def create(name: str, parameters: Mapping[str, Any] | None = None) -> Matcher[Any]:
@@ -113,10 +115,7 @@ def create(name: str, parameters: Mapping[str, Any] | None = None) -> Matcher[An
 
 def describe(name: str) -> MatcherInfo:
     """Tell whether a matcher runs here; imports what it needs to find out. Never raises for a broken one."""
-    declared = _entry_points().get(name)
-    origin = "registered"
-    if declared is not None:
-        origin = declared.dist.name if declared.dist is not None else "unknown"
+    origin = _matchers.origin(name)
     summary = ""
     try:
         cls = load(name)
@@ -130,21 +129,3 @@ def describe(name: str) -> MatcherInfo:
         reason = f"{type(error).__name__}: {error}"
         return MatcherInfo(name, origin, False, summary, reason, f"pip install --force-reinstall {origin}")
     return MatcherInfo(name, origin, True, summary)
-
-
-def _entry_points() -> dict[str, EntryPoint]:
-    found: dict[str, EntryPoint] = {}
-    for entry in entry_points(group=GROUP):
-        other = found.get(entry.name)
-        if other is not None and other.value != entry.value:
-            raise ConfigError(
-                f"two installed packages declare a matcher named {entry.name!r}: {other.value} and {entry.value}; "
-                "uninstall one of them"
-            )
-        found[entry.name] = entry
-    return found
-
-
-def _reinstall(entry: EntryPoint) -> str:
-    name = entry.dist.name if entry.dist is not None else entry.value.split(".")[0]
-    return f"pip install --force-reinstall {name}"

@@ -1,0 +1,150 @@
+"""Named parts that anybody may add: matchers, fitness functions, datasets, readers, all through the same two doors.
+
+An installed package declares an entry point in the kind's group; a file is named with ``--plugin`` (or in
+``$HSSLAM_PLUGINS``, see `hsslam.plugin_files`) and registers what it defines. A part that cannot be loaded is
+listed with its reason, and takes nothing else down.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterator, Mapping
+from importlib.metadata import EntryPoint, entry_points
+from types import ModuleType
+from typing import Any, Generic, TypeVar
+
+from hsslam import plugin_files
+from hsslam.errors import ConfigError, UnavailableError
+
+T = TypeVar("T")
+
+
+class Registry(Generic[T]):
+    """The parts of one kind, by name.
+
+    Parameters
+    ----------
+    kind : str
+        What messages call one of them.
+    group : str
+        Entry points in this group declare them.
+    fault : callable
+        Tells why a loaded object is no such part (``"is not a ..."``); an empty text where it is one.
+    builtin : mapping, optional
+        What hsslam brings; matchers come through entry points instead.
+    discover : callable, optional
+        Finds parts that a plugin file defines without registering them.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        group: str,
+        *,
+        fault: Callable[[Any], str],
+        builtin: Mapping[str, T] | None = None,
+        discover: Callable[[ModuleType], Iterator[tuple[str, T]]] | None = None,
+    ) -> None:
+        self.kind = kind
+        self.group = group
+        self._fault = fault
+        self._builtin: dict[str, T] = dict(builtin or {})
+        self._discover = discover
+        self._registered: dict[str, T] = {}
+        self._origins: dict[str, str] = {}
+        self._searched: set[str] = set()
+
+    def names(self) -> list[str]:
+        """All names, the built-in ones first, else sorted; no plugin but the named files is imported."""
+        self._search_files()
+        others = {*self._entry_points(), *self._registered} - set(self._builtin)
+        return [*self._builtin, *sorted(others)]
+
+    def register(self, name: str, part: T) -> None:
+        """Make a part known to this process without packaging it.
+
+        Raises
+        ------
+        ConfigError
+            The name is taken by another part, or this is no such part.
+        """
+        if fault := self._fault(part):
+            raise ConfigError(f"{self.kind} {name!r} {fault}")
+        taken = name in self._builtin or name in self._entry_points()
+        if taken or self._registered.get(name, part) is not part:
+            whose = f" (from {self.origin(name)})" if name in self._entry_points() else ""
+            raise ConfigError(f"a {self.kind} named {name!r} exists already{whose}; give yours another name")
+        self._registered[name] = part
+        self._origins[name] = plugin_files.loading() or "registered"
+
+    def load(self, name: str) -> T:
+        """Return the part of that name.
+
+        Raises
+        ------
+        ConfigError
+            There is none; with the name that was probably meant.
+        UnavailableError
+            Its module cannot be imported, or holds something else.
+        """
+        self._search_files()
+        if name in self._builtin:
+            return self._builtin[name]
+        if name in self._registered:
+            return self._registered[name]
+        declared = self._entry_points().get(name)
+        if declared is None:
+            raise ConfigError(f"no {self.kind} is named {name!r}{self.suggest(name)}")
+        try:
+            loaded = declared.load()
+        except (Exception, SystemExit) as error:  # a plugin's import may fail in any way
+            reason = f"{type(error).__name__}: {error}"
+            raise UnavailableError(name, reason, _reinstall(declared), self.kind) from error
+        if fault := self._fault(loaded):
+            reason = f"{declared.value} {fault}"
+            raise UnavailableError(name, reason, _reinstall(declared), self.kind)
+        part: T = loaded
+        return part
+
+    def origin(self, name: str) -> str:
+        """The distribution or file that a part comes from; ``registered`` for one that a program registered."""
+        if name in self._builtin:
+            return "hsslam"
+        declared = self._entry_points().get(name)
+        if declared is not None:
+            return declared.dist.name if declared.dist is not None else "unknown"
+        return self._origins.get(name, "registered")
+
+    def suggest(self, name: str) -> str:
+        """What follows "no such name": the name that was probably meant, and those there are."""
+        known = self.names()
+        close = difflib.get_close_matches(name, known, n=1)
+        hint = f"; did you mean {close[0]!r}?" if close else ""
+        return f"{hint} (there are: {', '.join(known)})"
+
+    def _search_files(self) -> None:
+        for path, module in plugin_files.modules().items():
+            if path in self._searched or self._discover is None:
+                continue
+            self._searched.add(path)
+            with plugin_files.origin_of(path):
+                for name, part in self._discover(module):
+                    if all(part is not known for known in self._registered.values()):
+                        self.register(name, part)
+
+    def _entry_points(self) -> dict[str, EntryPoint]:
+        found: dict[str, EntryPoint] = {}
+        for entry in entry_points(group=self.group):
+            other = found.get(entry.name)
+            if other is not None and other.value != entry.value:
+                raise ConfigError(
+                    f"two installed packages declare a {self.kind} named {entry.name!r}: {other.value} and "
+                    f"{entry.value}; uninstall one of them"
+                )
+            found[entry.name] = entry
+        return found
+
+
+def _reinstall(entry: EntryPoint) -> str:
+    name = entry.dist.name if entry.dist is not None else entry.value.split(".")[0]
+    return f"pip install --force-reinstall {name}"
