@@ -66,11 +66,7 @@ class MatcherSection(BaseModel):
         MatcherUnavailableError
             The matcher's module cannot be imported.
         """
-        model = registry.load(self.name).Config
-        try:
-            return model.model_validate(self.__pydantic_extra__ or {})
-        except ValidationError as error:
-            raise ConfigError(explain(error, model, prefix=self.name)) from error
+        return registry.configure(self.name, self.__pydantic_extra__)
 
     def create(self) -> Matcher[Any]:
         """Make the matcher; raises what `hsslam.matching.create` does."""

@@ -38,10 +38,10 @@ def use(path: Path | str) -> None:
         There is no such file, or running it fails: says where.
     """
     full = str(Path(path).expanduser().resolve())
-    named = _named()
     _load(full)
-    if full not in named:
-        os.environ[VARIABLE] = os.pathsep.join([*named, full])
+    known = named()
+    if full not in known:
+        os.environ[VARIABLE] = os.pathsep.join([*known, full])
 
 
 def modules() -> dict[str, ModuleType]:
@@ -52,7 +52,7 @@ def modules() -> dict[str, ModuleType]:
     ConfigError
         As `use`.
     """
-    return {path: _load(path) for path in _named()}
+    return {path: _load(path) for path in named()}
 
 
 def fingerprints() -> dict[str, str]:
@@ -61,8 +61,13 @@ def fingerprints() -> dict[str, str]:
 
 
 def loading() -> str:
-    """Name of the file that is being loaded; empty where none is."""
-    return f"file {Path(_loading[-1]).name}" if _loading else ""
+    """Path of the file that is being loaded; empty where none is."""
+    return _loading[-1] if _loading else ""
+
+
+def named() -> list[str]:
+    """Paths of the files that are named."""
+    return [path for path in os.environ.get(VARIABLE, "").split(os.pathsep) if path]
 
 
 @contextmanager
@@ -73,10 +78,6 @@ def origin_of(path: str) -> Iterator[None]:
         yield
     finally:
         _loading.pop()
-
-
-def _named() -> list[str]:
-    return [path for path in os.environ.get(VARIABLE, "").split(os.pathsep) if path]
 
 
 def _load(path: str) -> ModuleType:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, TypeVar
 
@@ -51,13 +52,13 @@ class Registry(Generic[T]):
         self._builtin: dict[str, T] = dict(builtin or {})
         self._discover = discover
         self._registered: dict[str, T] = {}
-        self._origins: dict[str, str] = {}
+        self._files: dict[str, str] = {}
         self._searched: set[str] = set()
 
     def names(self) -> list[str]:
         """All names, the built-in ones first, else sorted; no plugin but the named files is imported."""
         self._search_files()
-        others = {*self._entry_points(), *self._registered} - set(self._builtin)
+        others = {*self._entry_points(), *self._known()} - set(self._builtin)
         return [*self._builtin, *sorted(others)]
 
     def register(self, name: str, part: T) -> None:
@@ -71,11 +72,11 @@ class Registry(Generic[T]):
         if fault := self._fault(part):
             raise ConfigError(f"{self.kind} {name!r} {fault}")
         taken = name in self._builtin or name in self._entry_points()
-        if taken or self._registered.get(name, part) is not part:
+        if taken or self._known().get(name, part) is not part:
             whose = f" (from {self.origin(name)})" if name in self._entry_points() else ""
             raise ConfigError(f"a {self.kind} named {name!r} exists already{whose}; give yours another name")
         self._registered[name] = part
-        self._origins[name] = plugin_files.loading() or "registered"
+        self._files[name] = plugin_files.loading()
 
     def load(self, name: str) -> T:
         """Return the part of that name.
@@ -90,8 +91,9 @@ class Registry(Generic[T]):
         self._search_files()
         if name in self._builtin:
             return self._builtin[name]
-        if name in self._registered:
-            return self._registered[name]
+        known = self._known()
+        if name in known:
+            return known[name]
         declared = self._entry_points().get(name)
         if declared is None:
             raise ConfigError(f"no {self.kind} is named {name!r}{self.suggest(name)}")
@@ -99,10 +101,10 @@ class Registry(Generic[T]):
             loaded = declared.load()
         except (Exception, SystemExit) as error:  # a plugin's import may fail in any way
             reason = f"{type(error).__name__}: {error}"
-            raise UnavailableError(name, reason, _reinstall(declared), self.kind) from error
+            raise UnavailableError(name, reason, self.remedy(name), self.kind) from error
         if fault := self._fault(loaded):
             reason = f"{declared.value} {fault}"
-            raise UnavailableError(name, reason, _reinstall(declared), self.kind)
+            raise UnavailableError(name, reason, self.remedy(name), self.kind)
         part: T = loaded
         return part
 
@@ -113,7 +115,16 @@ class Registry(Generic[T]):
         declared = self._entry_points().get(name)
         if declared is not None:
             return declared.dist.name if declared.dist is not None else "unknown"
-        return self._origins.get(name, "registered")
+        file = self._files.get(name)
+        return f"file {Path(file).name}" if file else "registered"
+
+    def remedy(self, name: str) -> str:
+        """The line to type where a part is broken, not merely short of something."""
+        declared = self._entry_points().get(name)
+        if declared is None:
+            return f"correct {self.origin(name)}"
+        package = declared.dist.name if declared.dist is not None else declared.value.split(".")[0]
+        return f"pip install --force-reinstall {package}"
 
     def suggest(self, name: str) -> str:
         """What follows "no such name": the name that was probably meant, and those there are."""
@@ -132,6 +143,11 @@ class Registry(Generic[T]):
                     if all(part is not known for known in self._registered.values()):
                         self.register(name, part)
 
+    def _known(self) -> dict[str, T]:
+        """What was registered, but for what comes from a file that is named no more."""
+        named = {"", *plugin_files.named()}
+        return {name: part for name, part in self._registered.items() if self._files[name] in named}
+
     def _entry_points(self) -> dict[str, EntryPoint]:
         found: dict[str, EntryPoint] = {}
         for entry in entry_points(group=self.group):
@@ -143,8 +159,3 @@ class Registry(Generic[T]):
                 )
             found[entry.name] = entry
         return found
-
-
-def _reinstall(entry: EntryPoint) -> str:
-    name = entry.dist.name if entry.dist is not None else entry.value.split(".")[0]
-    return f"pip install --force-reinstall {name}"

@@ -61,6 +61,7 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def registered(monkeypatch: pytest.MonkeyPatch) -> None:
     """Forget what a test registers."""
     monkeypatch.setattr(registry._matchers, "_registered", {})
+    monkeypatch.setattr(registry._matchers, "_files", {})
 
 
 def test_the_built_in_matchers_are_listed() -> None:

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
-import signal
-import subprocess
-import sys
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -24,6 +19,7 @@ from hsslam_eval.comparison import (
     SlamOutcome,
     read_record,
 )
+from hsslam_eval.supervise import supervise
 from hsslam_eval.workspace import Workspace
 
 __all__ = ["CompareConfig", "DatasetSpec", "Progress", "compare"]
@@ -58,8 +54,8 @@ def compare(
     """Run trials and SLAM for each matcher, each part in a process of its own.
 
     What is complete in ``out`` from an earlier call with the same settings is taken as it is; what failed or is
-    missing is done. A matcher that is unavailable, raises or crashes costs its own row only. The outcome is also
-    written to ``out/comparison.json``.
+    missing is done. A matcher that is unavailable, raises, crashes or hangs (``config.limits``) costs its own row
+    only. The outcome is also written to ``out/comparison.json``.
 
     Parameters
     ----------
@@ -151,43 +147,23 @@ class _Part:
         return record if failure is None else failure
 
     def _run(self, tell: Progress) -> Failure | None:
-        reading, writing = os.pipe()
-        arguments = [str(self.workspace.out), self.label, self.stage, str(writing)]
-        with self.workspace.log(self.label, self.stage).open("wb") as log:
-            process = subprocess.Popen(
-                # -P: the folder it is started in must not shadow installed packages.
-                [sys.executable, "-P", "-m", "hsslam_eval.worker", *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                pass_fds=[writing],
-            )
-        os.close(writing)
         failure: Failure | None = None
-        try:
-            with os.fdopen(reading, encoding="utf-8") as messages:
-                for line in messages:
-                    message = json.loads(line)
-                    if "failure" in message:
-                        failure = Failure(**message["failure"])
-                    else:
-                        tell(message["stage"], self.label, message["done"], message["total"])
-            code = process.wait()
-        finally:
-            if process.poll() is None:
-                process.kill()
-                process.wait()
-        if failure is None and code != 0:
-            failure = Failure(self.stage, self._died(code))
-        return failure
+        last = ("prepare", 0, 0)
 
-    def _died(self, code: int) -> str:
-        log = self.workspace.log(self.label, self.stage)
-        how = f"ended with exit code {code}"
-        if code < 0:
-            how = f"was ended by signal {-code} ({signal.Signals(-code).name})"
-        lines = [
-            line for line in log.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()
-        ]
-        said = f"; its last line: {lines[-1].strip()[:200]}" if lines else ""
-        return f"its process {how}{said} ({log.relative_to(self.workspace.out)})"
+        def listen(message: dict[str, Any]) -> None:
+            nonlocal failure, last
+            if "failure" in message:
+                failure = Failure(**message["failure"])
+            elif "stage" in message:
+                last = (message["stage"], message["done"], message["total"])
+            stage, done, total = last
+            tell(stage, self.label, done, total)
+
+        workspace = self.workspace
+        log = workspace.log(self.label, self.stage)
+        reason = supervise([str(workspace.out), self.label, self.stage], log, workspace.config.limits, listen)
+        if workspace.record(self.label, self.stage).is_file():
+            return None  # complete, whatever the process did afterwards
+        if failure is not None:
+            return failure
+        return Failure(self.stage, reason or "its process ended of its own accord and left no result")

@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_serializer, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_serializer, model_validator
 
 from hsslam.config import Config, MatcherSection, Section
 from hsslam.datasets.dataset import Dataset
-from hsslam.errors import ConfigError, MatcherUnavailableError
+from hsslam.errors import MatcherUnavailableError
 from hsslam.matching import registry
-from hsslam.validation import explain
 from hsslam_eval.trial_config import TrialConfig
 
 DEFAULT_MATCHERS = ("hsl", "hide", "glasm", "icp", "kiss_icp")
@@ -45,17 +44,22 @@ class Contestant(BaseModel):
         """
         given = dict(self.__pydantic_extra__ or {})
         try:
-            model = registry.load(self.name).Config
+            return registry.configure(self.name, given, self.label).model_dump(mode="json")
         except MatcherUnavailableError:
             return given
-        try:
-            return model.model_validate(given).model_dump(mode="json")
-        except ValidationError as error:
-            raise ConfigError(explain(error, model, prefix=self.label or self.name)) from error
 
     @model_serializer
     def _resolved(self) -> dict[str, Any]:
         return {"name": self.name, "label": self.label, **self.parameters}
+
+
+class LimitSection(Section):
+    """When a matcher's part of a comparison, its trials or its SLAM run, is given up."""
+
+    step: float = Field(
+        300.0, ge=0.0, description="it took no step (a trial, a scan, a stage) for this long (s; 0: never)"
+    )
+    total: float = Field(0.0, ge=0.0, description="it took longer than this in all (s; 0: never)")
 
 
 class CompareConfig(Section):
@@ -71,6 +75,7 @@ class CompareConfig(Section):
     slam: Config = Field(
         default_factory=Config, description="settings of SLAM shared by all; its matcher is each one in turn"
     )
+    limits: LimitSection = Field(LimitSection(), description="when a matcher is given up; the others go on")
 
     @model_validator(mode="before")
     @classmethod

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import shutil
 import sys
 import traceback
@@ -82,7 +83,7 @@ def run_slam_stage(workspace: Workspace, label: str, reporter: Reporter) -> Slam
     config.matcher.create()
     dataset = workspace.dataset.open()
     began = perf_counter()
-    _warm_up(config, dataset)
+    _warm_up(config, dataset, reporter)
     warm_up_seconds = perf_counter() - began
 
     place = workspace.run_folder(label)
@@ -100,8 +101,9 @@ def run_slam_stage(workspace: Workspace, label: str, reporter: Reporter) -> Slam
                 journal.write(event)
             reporter.progress("slam", done, max(total, done) if total else 0)
         reporter.progress("optimise", 0, 0)
-        for event in slam.finish():
+        for done, event in enumerate(slam.finish(), start=1):
             journal.write(event)
+            reporter.progress("optimise", done, 0)
         result = slam.result()
         wall, cpu = perf_counter() - began, cpu_seconds() - cpu_began
     peak = peak_memory_mb()
@@ -130,6 +132,7 @@ def run_slam_stage(workspace: Workspace, label: str, reporter: Reporter) -> Slam
 def main(arguments: list[str]) -> int:
     """Do one stage; the exit code is 0 where its record was written."""
     out, label, stage, descriptor = arguments
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash is told in a line, not in a core file
     reporter = Reporter(int(descriptor))
     try:
         workspace = Workspace.open(Path(out))
@@ -139,7 +142,7 @@ def main(arguments: list[str]) -> int:
         reporter.failure(Failure("unavailable", error.reason, error.remedy))
     except HsslamError as error:
         reporter.failure(Failure(stage, str(error)))
-    except Exception as error:  # whatever a matcher may raise: it costs its row only
+    except (Exception, SystemExit) as error:  # whatever a matcher may raise: it costs its row only
         traceback.print_exc()
         reporter.failure(Failure(stage, f"{type(error).__name__}: {error}"))
     else:
@@ -147,7 +150,7 @@ def main(arguments: list[str]) -> int:
     return 1
 
 
-def _warm_up(config: Config, dataset: Dataset) -> None:
+def _warm_up(config: Config, dataset: Dataset, reporter: Reporter) -> None:
     """Run a short log through every stage, so that nothing is compiled or imported on the clock."""
     from hsslam.slam.pipeline import Slam
 
@@ -158,8 +161,8 @@ def _warm_up(config: Config, dataset: Dataset) -> None:
         }
     )
     scans = islice(dataset.scans(), 0, _WARM_UP_SCANS * _WARM_UP_STEP, _WARM_UP_STEP)
-    for _ in Slam(eager).run(scans):
-        pass
+    for done, _ in enumerate(Slam(eager).run(scans), start=1):
+        reporter.progress("prepare", done, 0)
 
 
 def _metrics(record: SlamOutcome, config: Config, dataset: Dataset) -> dict[str, Any]:
@@ -194,4 +197,8 @@ def _timings(record: SlamOutcome) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    code = main(sys.argv[1:])
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # All is written: a matcher's threads must not keep the process, nor its library crash it, on the way out.
+    os._exit(code)

@@ -19,6 +19,7 @@ from typing import Any
 
 import yaml
 
+from hsslam import plugin_files
 from hsslam.config import read_yaml, validate
 from hsslam.datasets.dataset import Dataset
 from hsslam.errors import ConfigError, DataError
@@ -73,9 +74,10 @@ class Workspace:
         for name in ("records", "runs", "logs"):
             (out / name).mkdir(exist_ok=True)
         data_dir = None if dataset.data_dir is None else str(dataset.data_dir)
+        apart = {"data_dir": data_dir, "limits": config.limits.model_dump()}
         with atomic_path(out / _FILE) as temporary:
             temporary.write_text(
-                yaml.safe_dump({**workspace._identity(), "data_dir": data_dir}, sort_keys=False),
+                yaml.safe_dump({**workspace._identity(), **apart}, sort_keys=False),
                 encoding="utf-8",
             )
         return workspace
@@ -87,7 +89,7 @@ class Workspace:
         spec = {**data["dataset"], "data_dir": data["data_dir"]}
         return cls(
             out,
-            validate(CompareConfig, data["config"], source=str(out / _FILE)),
+            validate(CompareConfig, {**data["config"], "limits": data["limits"]}, source=str(out / _FILE)),
             validate(DatasetSpec, spec, source=str(out / _FILE)),
         )
 
@@ -122,15 +124,18 @@ class Workspace:
         return min(known, wanted) if wanted is not None else known
 
     def _identity(self) -> dict[str, Any]:
+        """What decides the results: where the data lie and how long a matcher may take do not."""
+        config = {key: value for key, value in self.config.resolved().items() if key != "limits"}
         return {
             "version": __version__,
             "dataset": self.dataset.model_dump(mode="json", exclude={"data_dir"}),
-            "config": self.config.resolved(),
+            "config": config,
+            "plugins": plugin_files.fingerprints(),
         }
 
 
 def _check_same(out: Path, was: Mapping[str, Any], now: Mapping[str, Any]) -> None:
-    before, after = (_flat({**side, "data_dir": None}) for side in (was, now))
+    before, after = (_flat({**side, "data_dir": None, "limits": None}) for side in (was, now))
     different = [
         f"{key} was {before.get(key, 'unset')}, now {after.get(key, 'unset')}"
         for key in sorted({*before, *after})

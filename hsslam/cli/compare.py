@@ -13,7 +13,7 @@ import typer
 from typer.core import TyperCommand
 
 from hsslam.cli import console, interrupt
-from hsslam.cli.options import DataDir, OnError, Quiet, Scans, Seed, policy
+from hsslam.cli.options import DataDir, OnError, Plugin, Quiet, Scans, Seed, policy
 from hsslam.cli.progress import Progress, progress
 from hsslam.cli.settings import split
 from hsslam.errors import ConfigError
@@ -88,6 +88,15 @@ def compare(
             "(hide.memory_size=40); may be repeated.",
         ),
     ] = None,
+    time_limit: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            metavar="SECONDS",
+            help="Give up a matcher's trials or SLAM run that takes no step for so long; 300 if left out, 0: never.",
+        ),
+    ] = None,
+    plugin: Plugin = None,
     seed: Seed = None,
     scans: Scans = None,
     data_dir: DataDir = None,
@@ -116,6 +125,7 @@ def compare(
         "run_trials": False if no_trials else None,
         "run_slam": False if no_slam else None,
         "trials": _without_none({"count": trials, "protocol": protocol}),
+        "limits": _without_none({"step": time_limit}),
     }
     resolved = resolve(config, split(matchers or ()), _without_none(given), settings or ())
     spec = DatasetSpec(
@@ -158,7 +168,8 @@ class Tell:
             self._at = (stage, matcher)
             place = f"[{self._labels.index(matcher) + 1}/{len(self._labels)}] {matcher}: {what}"
             self._shown.stage(place, total or None, unit)
-        self._shown.update(done)
+        if unit:
+            self._shown.update(done)
 
 
 def resolve(
@@ -186,6 +197,7 @@ def resolve(
     contestants = {str(item.get("label") or item.get("name")): item for item in listed}
     slam = dict(data.get("slam") or {})
     trials = dict(data.get("trials") or {})
+    limits = dict(data.get("limits") or {})
     for setting in settings:
         section, dot, rest = setting.partition(".")
         if section == "matcher" and dot:
@@ -193,7 +205,7 @@ def resolve(
                 f"--set {setting}: compare has several matchers; set a parameter of one by its name, "
                 f"e.g. {next(iter(contestants))}.{rest or 'score_distance=0.1'}"
             )
-        sections = {"trials": trials, "slam": slam, **contestants}
+        sections = {"trials": trials, "slam": slam, "limits": limits, **contestants}
         if dot and section in sections:
             apply_override(sections[section], rest)
         else:
@@ -201,7 +213,7 @@ def resolve(
             apply_override(data if own else slam, setting)
     return validate(
         CompareConfig,
-        {**data, "matchers": listed, "slam": slam, "trials": trials},
+        {**data, "matchers": listed, "slam": slam, "trials": trials, "limits": limits},
         source=str(file) if file is not None else "",
     )
 

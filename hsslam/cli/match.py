@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hsslam.cli import console
-from hsslam.cli.options import AsJson, DataDir, MatcherName, Quiet, Seed, Settings
+from hsslam.cli.options import AsJson, DataDir, MatcherName, Plugin, Quiet, Seed, Settings
 from hsslam.cli.progress import progress
 from hsslam.errors import ConfigError, DataError
 
@@ -26,6 +26,7 @@ def match(
         ),
     ],
     matcher: MatcherName = None,
+    plugin: Plugin = None,
     guess: Annotated[
         str,
         typer.Option(

@@ -8,20 +8,20 @@ from typing import Annotated, Any
 import typer
 
 from hsslam.cli import console
-from hsslam.cli.options import AsJson
+from hsslam.cli.options import AsJson, Plugin
 
 app = typer.Typer(help="List the matchers and their parameters.", rich_markup_mode=None)
 
 
 @app.callback(invoke_without_command=True)
-def default(context: typer.Context) -> None:
+def default(context: typer.Context, plugin: Plugin = None) -> None:
     """List the matchers and their parameters."""
     if context.invoked_subcommand is None:
         show()
 
 
 @app.command("list")
-def show(as_json: AsJson = False) -> None:
+def show(as_json: AsJson = False, plugin: Plugin = None) -> None:
     """List the matchers, and why one does not run here."""
     from dataclasses import asdict
 
@@ -47,6 +47,7 @@ def show(as_json: AsJson = False) -> None:
 def describe(
     name: Annotated[str, typer.Argument(help="A matcher's name.")],
     as_json: AsJson = False,
+    plugin: Plugin = None,
 ) -> None:
     """Print a matcher's parameters: name, type, default, range, meaning."""
     from hsslam.matching import registry

@@ -45,6 +45,28 @@ OnError: TypeAlias = Annotated[
 ]
 
 
+def _use(context: typer.Context, files: list[Path] | None) -> list[Path] | None:
+    if files and not context.resilient_parsing:
+        from hsslam import plugin_files
+
+        for file in files:
+            plugin_files.use(file)
+    return files
+
+
+Plugin: TypeAlias = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--plugin",
+        metavar="FILE",
+        callback=_use,
+        is_eager=True,
+        help="A Python file with matchers (or other parts) of your own; may be repeated.",
+    ),
+]
+"""Takes effect by itself, before the other options are looked at."""
+
+
 def policy(text: str | None) -> Literal["stop", "skip"]:
     """Check what ``--on-error`` was given; raises `ConfigError`."""
     match text:

@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hsslam.cli import console
-from hsslam.cli.options import ConfigFile, DataDir, MatcherName, OnError, Quiet, Scans, Seed, Settings, policy
+from hsslam.cli.options import (
+    ConfigFile,
+    DataDir,
+    MatcherName,
+    OnError,
+    Plugin,
+    Quiet,
+    Scans,
+    Seed,
+    Settings,
+    policy,
+)
 from hsslam.cli.progress import progress
 from hsslam.cli.settings import resolve
 from hsslam.errors import ConfigError
@@ -40,6 +51,7 @@ def run(
     ] = None,
     quiet: Quiet = False,
     on_error: OnError = None,
+    plugin: Plugin = None,
 ) -> None:
     """Run SLAM over a log; leaves a run folder.
 

@@ -160,7 +160,8 @@ class MatchResult:
     evaluations : int
         Fitness evaluations or iterations spent.
     diagnostics : mapping
-        ``rejected`` tells why an answer was refused; ``degenerate_direction`` (rad, in the reference's frame) is
+        ``rejected`` tells why an answer was refused, ``covariance_rejected`` why the method's own covariance was
+        (the framework's stands in for it); ``degenerate_direction`` (rad, in the reference's frame) is
         there where the returns leave a direction open, such as that of a plain corridor; the rest is the
         method's own.
     """
@@ -298,6 +299,12 @@ class Matcher(ABC, Generic[ConfigT]):
         )
         if not math.isnan(direction):
             diagnostics = {**diagnostics, "degenerate_direction": direction}
+        if covariance is not None and not _is_covariance(covariance):
+            diagnostics = {
+                **diagnostics,
+                "covariance_rejected": "not a symmetric, positive definite (3, 3) matrix",
+            }
+            covariance = None
         if covariance is None:
             covariance = estimated
         return MatchResult(
@@ -308,6 +315,18 @@ class Matcher(ABC, Generic[ConfigT]):
             evaluations=found.evaluations,
             diagnostics=diagnostics,
         )
+
+
+def _is_covariance(matrix: NDArray[np.float64]) -> bool:
+    if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
+        return False
+    if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):
+        return False
+    try:
+        np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
 
 def clean(points: Points) -> Points:

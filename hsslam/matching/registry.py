@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from hsslam.errors import ConfigError, HsslamError, MatcherUnavailableError, UnavailableError
-from hsslam.matching.interface import Matcher
+from hsslam.matching.interface import Matcher, MatcherConfig
 from hsslam.registry import Registry
 from hsslam.validation import explain
 
@@ -20,9 +20,11 @@ GROUP = "hsslam.matchers"
 
 
 def _fault(part: Any) -> str:
-    if isinstance(part, type) and issubclass(part, Matcher):
-        return ""
-    return "is not a subclass of hsslam.matching.Matcher"
+    if not (isinstance(part, type) and issubclass(part, Matcher)):
+        return "is not a subclass of hsslam.matching.Matcher"
+    if not (isinstance(part.Config, type) and issubclass(part.Config, MatcherConfig)):
+        return "has a Config that is not a subclass of hsslam.matching.MatcherConfig"
+    return ""
 
 
 def _defined_in(module: ModuleType) -> Iterator[tuple[str, type[Matcher[Any]]]]:
@@ -95,6 +97,26 @@ def load(name: str) -> type[Matcher[Any]]:
         raise MatcherUnavailableError(error.name, error.reason, error.remedy) from error
 
 
+def configure(name: str, parameters: Mapping[str, Any] | None = None, label: str = "") -> MatcherConfig:
+    """Validate a matcher's parameters; ``label`` stands for its name in messages.
+
+    Raises
+    ------
+    ConfigError
+        Unknown name, unknown parameter, or a value out of its range.
+    MatcherUnavailableError
+        Its module cannot be imported, or its own checks of its parameters break.
+    """
+    model = load(name).Config
+    try:
+        return model.model_validate(dict(parameters or {}))
+    except ValidationError as error:
+        raise ConfigError(explain(error, model, prefix=label or name)) from error
+    except Exception as error:  # a plugin's own validators may fail in any way
+        reason = f"its Config cannot be made: {type(error).__name__}: {error}"
+        raise MatcherUnavailableError(name, reason, _matchers.remedy(name)) from error
+
+
 def create(name: str, parameters: Mapping[str, Any] | None = None) -> Matcher[Any]:
     """Make a matcher from its name and parameters.
 
@@ -105,12 +127,8 @@ def create(name: str, parameters: Mapping[str, Any] | None = None) -> Matcher[An
     MatcherUnavailableError
         It cannot run here.
     """
-    cls = load(name)
-    try:
-        config = cls.Config.model_validate(dict(parameters or {}))
-    except ValidationError as error:
-        raise ConfigError(explain(error, cls.Config, prefix=name)) from error
-    return cls(config)
+    config = configure(name, parameters)
+    return load(name)(config)
 
 
 def describe(name: str) -> MatcherInfo:
@@ -127,5 +145,5 @@ def describe(name: str) -> MatcherInfo:
         raise
     except Exception as error:  # a plugin's own check may fail in any way; it costs that plugin only
         reason = f"{type(error).__name__}: {error}"
-        return MatcherInfo(name, origin, False, summary, reason, f"pip install --force-reinstall {origin}")
+        return MatcherInfo(name, origin, False, summary, reason, _matchers.remedy(name))
     return MatcherInfo(name, origin, True, summary)

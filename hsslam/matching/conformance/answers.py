@@ -50,6 +50,8 @@ def check_covariance(matcher: Matcher[Any]) -> None:
     good = match_room(matcher)
     for what, result in (("an easy room", good), ("a single wall", wall), ("a hopeless guess", lost)):
         covariance = result.covariance
+        refused = result.diagnostics.get("covariance_rejected")
+        require(refused is None, f"covariance of {what} is {refused}")
         require(
             np.allclose(covariance, covariance.T, rtol=1e-9, atol=0.0),
             f"covariance of {what} is not symmetric",
