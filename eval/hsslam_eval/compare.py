@@ -161,7 +161,8 @@ class _Part:
 
         workspace = self.workspace
         log = workspace.log(self.label, self.stage)
-        reason = supervise([str(workspace.out), self.label, self.stage], log, workspace.config.limits, listen)
+        arguments = [str(workspace.out), self.label, self.stage]
+        reason = supervise("hsslam_eval.worker", arguments, log, workspace.config.limits, listen)
         if workspace.record(self.label, self.stage).is_file():
             return None  # complete, whatever the process did afterwards
         if failure is not None:

@@ -30,13 +30,17 @@ _GRACE = 2.0
 """How long a process that hangs may take to write where it is (s)."""
 
 
-def supervise(arguments: Sequence[str], log: Path, limits: LimitSection, listener: Listener) -> str:
-    """Run ``python -m hsslam_eval.worker`` to its end.
+def supervise(
+    module: str, arguments: Sequence[str], log: Path, limits: LimitSection, listener: Listener
+) -> str:
+    """Run ``python -m MODULE`` to its end.
 
     Parameters
     ----------
+    module : str
+        The worker: writes JSON objects, one a line, to the file descriptor that its last argument names.
     arguments : sequence of str
-        The worker's; the file descriptor for its messages is added.
+        Its other arguments.
     log : path
         Takes what the process prints.
     limits : LimitSection
@@ -59,7 +63,7 @@ def supervise(arguments: Sequence[str], log: Path, limits: LimitSection, listene
                 "-X",
                 "faulthandler",
                 "-m",
-                "hsslam_eval.worker",
+                module,
                 *arguments,
                 str(writing),
             ],

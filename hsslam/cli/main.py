@@ -16,6 +16,7 @@ from hsslam.cli import (
     interrupt,
     match,
     matchers,
+    plugin,
     reproduce,
     run,
 )
@@ -68,6 +69,7 @@ app.command("match")(match.match)
 app.command("eval")(evaluate.evaluate)
 app.command("reproduce")(reproduce.reproduce)
 app.add_typer(matchers.app, name="matchers")
+app.add_typer(plugin.app, name="plugin")
 app.add_typer(datasets.app, name="datasets")
 app.add_typer(config.app, name="config")
 

@@ -25,6 +25,9 @@ from hsslam.se2 import Points, Pose, wrap
 MINIMUM_POINTS = 3
 """Fewer points than this, on either side, fix no pose."""
 
+LEFT_WINDOW = "the answer left the search window"
+"""``diagnostics["rejected"]`` of an answer that did: no fault of a local method's."""
+
 
 class MatcherConfig(BaseModel):
     """Parameters every matcher has; a plugin's own come in a subclass."""
@@ -290,8 +293,8 @@ class Matcher(ABC, Generic[ConfigT]):
         pose, converged, diagnostics = found.pose, found.converged, found.diagnostics
         covariance = found.covariance
         if not window.contains(guess, pose):
-            why = "left the search window" if np.isfinite(pose).all() else "is not finite"
-            diagnostics = {**diagnostics, "rejected": f"the answer {why}"}
+            why = LEFT_WINDOW if np.isfinite(pose).all() else "the answer is not finite"
+            diagnostics = {**diagnostics, "rejected": why}
             pose, converged, covariance = guess, False, None
         pose = np.array([pose[0], pose[1], wrap(pose[2])])
         score, estimated, direction = assess(
