@@ -17,4 +17,8 @@ def kernel(function: _F) -> _F:
     them. Division follows NumPy (no exception), and the kernel releases the interpreter lock, so that threads
     may match side by side.
     """
-    return cast(_F, numba.njit(cache=True, error_model="numpy", nogil=True)(function))
+    options = {"error_model": "numpy", "nogil": True}
+    try:
+        return cast(_F, numba.njit(cache=True, **options)(function))
+    except RuntimeError:  # no folder that a cache could lie in; `hsslam doctor` tells what mends that
+        return cast(_F, numba.njit(**options)(function))

@@ -12,6 +12,7 @@ from hsslam.cli import (
     config,
     console,
     datasets,
+    doctor,
     evaluate,
     interrupt,
     match,
@@ -68,6 +69,7 @@ app.command("compare", cls=compare.ManyMatchers)(compare.compare)
 app.command("match")(match.match)
 app.command("eval")(evaluate.evaluate)
 app.command("reproduce")(reproduce.reproduce)
+app.command("doctor")(doctor.doctor)
 app.add_typer(matchers.app, name="matchers")
 app.add_typer(plugin.app, name="plugin")
 app.add_typer(datasets.app, name="datasets")

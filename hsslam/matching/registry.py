@@ -81,6 +81,11 @@ def names() -> list[str]:
     return _matchers.names()
 
 
+def origin(name: str) -> str:
+    """The distribution or file that a matcher comes from; ``registered`` for one that a program registered."""
+    return _matchers.origin(name)
+
+
 def load(name: str) -> type[Matcher[Any]]:
     """Return the class of a matcher; heavy dependencies are not imported yet.
 
@@ -133,17 +138,17 @@ def create(name: str, parameters: Mapping[str, Any] | None = None) -> Matcher[An
 
 def describe(name: str) -> MatcherInfo:
     """Tell whether a matcher runs here; imports what it needs to find out. Never raises for a broken one."""
-    origin = _matchers.origin(name)
+    source = origin(name)
     summary = ""
     try:
         cls = load(name)
         summary = cls.summary
         cls.check_available()
     except MatcherUnavailableError as error:
-        return MatcherInfo(name, origin, False, summary, error.reason, error.remedy)
+        return MatcherInfo(name, source, False, summary, error.reason, error.remedy)
     except HsslamError:
         raise
     except Exception as error:  # a plugin's own check may fail in any way; it costs that plugin only
         reason = f"{type(error).__name__}: {error}"
-        return MatcherInfo(name, origin, False, summary, reason, _matchers.remedy(name))
-    return MatcherInfo(name, origin, True, summary)
+        return MatcherInfo(name, source, False, summary, reason, _matchers.remedy(name))
+    return MatcherInfo(name, source, True, summary)

@@ -1,0 +1,91 @@
+"""`hsslam doctor` finds what is broken or missing, says what mends it, and is not taken down by it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from hsslam import plugin_files
+from hsslam.cli.main import app
+from hsslam.doctor import Finding, examine
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of packages for this process and those that it starts."""
+    place = tmp_path / "site"
+    place.mkdir()
+    monkeypatch.syspath_prepend(str(place))
+    monkeypatch.setenv(
+        "PYTHONPATH", os.pathsep.join(filter(None, [str(place), os.environ.get("PYTHONPATH")]))
+    )
+    return place
+
+
+def found(data_dir: Path | None = None) -> dict[str, Finding]:
+    return {finding.what: finding for finding in examine(data_dir)}
+
+
+def test_broken_and_missing_parts_are_told_apart_and_mended(
+    site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (site / "kiss_icp.py").write_text("raise ModuleNotFoundError('no kiss_icp', name='kiss_icp')\n")
+    (site / "crashing.py").write_text("import ctypes\nctypes.string_at(0)\n")
+    information = site / "crashing_matcher-1.0.dist-info"
+    information.mkdir()
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: crashing-matcher\nVersion: 1.0\n")
+    (information / "entry_points.txt").write_text("[hsslam.matchers]\ncrash = crashing:Crash\n")
+    monkeypatch.setenv(plugin_files.VARIABLE, str(tmp_path / "gone.py"))
+    (tmp_path / "taken").write_text("")
+    findings = found(tmp_path / "taken")
+    assert findings["data folder"].status == "broken"
+    assert findings["data folder"].remedy == "export HSSLAM_DATA=/a/folder/of/yours"
+    assert findings["packages"].status == "ok"
+    assert findings["kernel cache"].status == "ok"
+    assert findings["dataset intel"].status == "missing"
+    assert "fetch intel --data-dir" in findings["dataset intel"].remedy
+    assert findings["plugin files"] == Finding(
+        "plugin files", "broken", f"plugin {tmp_path / 'gone.py'}: no such file", "unset HSSLAM_PLUGINS"
+    )
+    monkeypatch.setenv(plugin_files.VARIABLE, "")
+    findings = found(tmp_path / "data")
+    assert findings["matcher hide"].status == "ok"
+    assert findings["matcher kiss_icp"].status == "missing"
+    assert findings["matcher kiss_icp"].remedy == "pip install 'hsslam[kiss-icp]'"
+    assert findings["matcher crash"] == Finding(
+        "matcher crash", "broken", "crashes (signal 11)", "pip install --force-reinstall crashing-matcher"
+    )
+
+
+@pytest.mark.parametrize(
+    ("status", "options", "code"),
+    [("ok", (), 0), ("missing", (), 0), ("missing", ("--strict",), 1), ("broken", (), 1)],
+)
+def test_the_exit_code_is_for_scripts(
+    monkeypatch: pytest.MonkeyPatch, status: str, options: tuple[str, ...], code: int
+) -> None:
+    finding = Finding("thing", status, "a detail", "a remedy")  # type: ignore[arg-type]
+    monkeypatch.setattr("hsslam.doctor.examine", lambda data_dir: iter([finding]))
+    result = CliRunner().invoke(app, ["doctor", *options])
+    assert result.exit_code == code
+    assert ("a remedy" in result.stdout) == (status != "ok")
+    told = json.loads(CliRunner().invoke(app, ["doctor", "--json"]).stdout)
+    assert told == [{"what": "thing", "status": status, "detail": "a detail", "remedy": "a remedy"}]
+
+
+def test_without_a_place_for_a_cache_kernels_still_compile() -> None:
+    code = (
+        "import numba.core.caching as caching\n"
+        "caching.CacheImpl._locator_classes = []\n"
+        "from hsslam.jit import kernel\n"
+        "def double(x): return x + x\n"
+        "print(kernel(double)(21))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "42", done.stderr
