@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from hsslam.cli import console, interrupt
+from hsslam.cli import complete, console, interrupt
 from hsslam.cli.options import DataDir, OnError, Plugin, Quiet, Scans, Seed, policy
 from hsslam.cli.progress import Progress, progress
 from hsslam.cli.settings import split
@@ -55,13 +55,16 @@ def compare(
         typer.Argument(
             metavar="[DATASET|PATH]",
             help="A name that `hsslam datasets` lists, or a log; office if left out.",
+            autocompletion=complete.datasets,
         ),
     ] = None,
     dataset: Annotated[str | None, typer.Option(metavar="NAME|PATH", help="The same, as an option.")] = None,
     matchers: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME...", help="Which, or `all`; the paper's three, icp and kiss_icp if left out."
+            metavar="NAME...",
+            help="Which, or `all`; the paper's three, icp and kiss_icp if left out.",
+            autocompletion=complete.matchers,
         ),
     ] = None,
     trials: Annotated[int | None, typer.Option(min=1, metavar="N", help="Trials of each matcher.")] = None,

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from hsslam.cli import console
+from hsslam.cli import complete, console
 from hsslam.cli.options import AsJson, Plugin
 
 app = typer.Typer(help="List the matchers and their parameters.", rich_markup_mode=None)
@@ -45,7 +45,7 @@ def show(as_json: AsJson = False, plugin: Plugin = None) -> None:
 
 @app.command()
 def describe(
-    name: Annotated[str, typer.Argument(help="A matcher's name.")],
+    name: Annotated[str, typer.Argument(help="A matcher's name.", autocompletion=complete.matchers)],
     as_json: AsJson = False,
     plugin: Plugin = None,
 ) -> None:

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, TypeAlias
 
 import typer
 
+from hsslam.cli import complete
 from hsslam.errors import ConfigError
 
 ConfigFile: TypeAlias = Annotated[
@@ -19,7 +20,13 @@ Settings: TypeAlias = Annotated[
     ),
 ]
 MatcherName: TypeAlias = Annotated[
-    str | None, typer.Option("--matcher", metavar="NAME", help="The matcher; `hsslam matchers` lists them.")
+    str | None,
+    typer.Option(
+        "--matcher",
+        metavar="NAME",
+        help="The matcher; `hsslam matchers` lists them.",
+        autocompletion=complete.matchers,
+    ),
 ]
 Seed: TypeAlias = Annotated[
     int | None, typer.Option("--seed", min=0, help="Every random choice follows from it; 0 where left out.")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hsslam.cli import console
+from hsslam.cli import complete, console
 from hsslam.cli.options import Plugin, Quiet, Seed
 from hsslam.cli.progress import Progress, progress
 from hsslam.cli.settings import split
@@ -49,7 +49,12 @@ def new(
 
 @app.command()
 def check(
-    name: Annotated[str, typer.Argument(help="A matcher that is installed, or that --plugin defines.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="A matcher that is installed, or that --plugin defines.", autocompletion=complete.matchers
+        ),
+    ],
     plugin: Plugin = None,
     against: Annotated[
         list[str] | None,

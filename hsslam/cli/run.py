@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hsslam.cli import console
+from hsslam.cli import complete, console
 from hsslam.cli.options import (
     ConfigFile,
     DataDir,
@@ -31,11 +31,20 @@ if TYPE_CHECKING:
 def run(
     dataset: Annotated[
         str | None,
-        typer.Argument(metavar="DATASET|PATH", help="A name that `hsslam datasets` lists, or a log."),
+        typer.Argument(
+            metavar="DATASET|PATH",
+            help="A name that `hsslam datasets` lists, or a log.",
+            autocompletion=complete.datasets,
+        ),
     ] = None,
     matcher: MatcherName = None,
     loop_matcher: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Another matcher for closing loops.")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Another matcher for closing loops.",
+            autocompletion=complete.matchers,
+        ),
     ] = None,
     config: ConfigFile = None,
     settings: Settings = None,

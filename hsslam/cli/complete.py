@@ -1,0 +1,21 @@
+"""What the shell offers where a name is expected; nothing heavy is imported to find out."""
+
+from __future__ import annotations
+
+
+def matchers(incomplete: str) -> list[str]:
+    """Names of installed matchers that begin like this."""
+    from importlib.metadata import entry_points
+
+    return _begin_like(incomplete, {entry.name for entry in entry_points(group="hsslam.matchers")})
+
+
+def datasets(incomplete: str) -> list[str]:
+    """Names of datasets that begin like this; the shell itself offers files where there is none."""
+    from hsslam.datasets import catalogue
+
+    return _begin_like(incomplete, set(catalogue.names()))
+
+
+def _begin_like(incomplete: str, names: set[str]) -> list[str]:
+    return sorted(name for name in names if name.startswith(incomplete))
