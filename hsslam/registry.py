@@ -8,6 +8,7 @@ listed with its reason, and takes nothing else down.
 from __future__ import annotations
 
 import difflib
+import importlib.util
 from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -71,10 +72,16 @@ class Registry(Generic[T]):
         """
         if fault := self._fault(part):
             raise ConfigError(f"{self.kind} {name!r} {fault}")
-        taken = name in self._builtin or name in self._entry_points()
-        if taken or self._known().get(name, part) is not part:
-            whose = f" (from {self.origin(name)})" if name in self._entry_points() else ""
-            raise ConfigError(f"a {self.kind} named {name!r} exists already{whose}; give yours another name")
+        declared, file = self._entry_points().get(name), plugin_files.loading()
+        if declared is not None and file and _lies_in(declared, file):
+            return  # an editable package and its own file: they are the same
+        if declared is not None:
+            mend = "leave out --plugin, or uninstall it" if file else "give yours another name"
+            raise ConfigError(
+                f"a {self.kind} named {name!r} exists already (from {self.origin(name)}); {mend}"
+            )
+        if name in self._builtin or self._known().get(name, part) is not part:
+            raise ConfigError(f"a {self.kind} named {name!r} exists already; give yours another name")
         self._registered[name] = part
         self._files[name] = plugin_files.loading()
 
@@ -159,3 +166,12 @@ class Registry(Generic[T]):
                 )
             found[entry.name] = entry
         return found
+
+
+def _lies_in(entry: EntryPoint, file: str) -> bool:
+    """Whether an entry point's module is this very file."""
+    try:
+        spec = importlib.util.find_spec(entry.module)
+    except (ImportError, ValueError):
+        return False
+    return spec is not None and spec.origin is not None and Path(spec.origin).resolve() == Path(file)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_serializer, model_validator
 
@@ -23,7 +23,7 @@ class Contestant(BaseModel):
     Unlike `hsslam.config.MatcherSection` it may name a matcher that cannot run here: that costs its row only.
     """
 
-    model_config = ConfigDict(frozen=True, extra="allow")
+    model_config: ClassVar[ConfigDict] = ConfigDict(frozen=True, extra="allow")
 
     name: str = Field(description="a name that `hsslam matchers` lists")
     label: str = Field("", description="what reports call it; its name where left out")

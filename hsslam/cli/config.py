@@ -11,7 +11,9 @@ from hsslam.cli import console
 from hsslam.cli.options import ConfigFile, MatcherName, Seed, Settings
 from hsslam.cli.settings import resolve
 
-app = typer.Typer(help="Show, check and explain settings.", rich_markup_mode=None, no_args_is_help=True)
+app: typer.Typer = typer.Typer(
+    help="Show, check and explain settings.", rich_markup_mode=None, no_args_is_help=True
+)
 
 
 @app.command()

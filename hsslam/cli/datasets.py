@@ -13,7 +13,7 @@ from hsslam.cli.options import AsJson, DataDir, Quiet, Scans, Seed
 from hsslam.cli.progress import progress
 from hsslam.errors import DataError
 
-app = typer.Typer(help="List, inspect, fetch and simulate datasets.", rich_markup_mode=None)
+app: typer.Typer = typer.Typer(help="List, inspect, fetch and simulate datasets.", rich_markup_mode=None)
 
 _LOG_SUFFIXES = (".clf", ".log", ".clf.gz", ".clf.bz2", ".log.gz", ".log.bz2")
 

@@ -40,7 +40,7 @@ class _Errors(TyperGroup):
 
 
 # Rich help would cost more than everything else that happens before help is printed.
-app = typer.Typer(
+app: typer.Typer = typer.Typer(
     cls=_Errors,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,

@@ -10,7 +10,7 @@ import typer
 from hsslam.cli import complete, console
 from hsslam.cli.options import AsJson, Plugin
 
-app = typer.Typer(help="List the matchers and their parameters.", rich_markup_mode=None)
+app: typer.Typer = typer.Typer(help="List the matchers and their parameters.", rich_markup_mode=None)
 
 
 @app.callback(invoke_without_command=True)

@@ -16,7 +16,9 @@ from hsslam.errors import ConfigError
 if TYPE_CHECKING:
     from hsslam_eval.conformance import CheckOutcome
 
-app = typer.Typer(help="Begin and check matchers of your own.", rich_markup_mode=None, no_args_is_help=True)
+app: typer.Typer = typer.Typer(
+    help="Begin and check matchers of your own.", rich_markup_mode=None, no_args_is_help=True
+)
 
 CHECK_FAILED = 1
 """Exit code where a promise is broken."""
@@ -71,7 +73,7 @@ def check(
     ] = None,
     time_limit: Annotated[
         float, typer.Option(min=1.0, metavar="SECONDS", help="A check that takes longer has failed.")
-    ] = 60.0,
+    ] = 120.0,
     seed: Seed = None,
     quiet: Quiet = False,
 ) -> None:

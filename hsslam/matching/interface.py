@@ -32,7 +32,7 @@ LEFT_WINDOW = "the answer left the search window"
 class MatcherConfig(BaseModel):
     """Parameters every matcher has; a plugin's own come in a subclass."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     score_distance: float = Field(
         0.10,

@@ -24,6 +24,8 @@ class PointToLineReference(Reference):
 
     def __init__(self, points: Points, reach: float) -> None:
         super().__init__(points)
+        self.far: NDArray[np.int32]
+        self.far_frame: NDArray[np.float64]
         self.far, self.far_frame = rasterise_nearest(self.surface.segments, RESOLUTION, reach)
 
 

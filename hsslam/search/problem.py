@@ -97,10 +97,10 @@ class Problem:
     ) -> None:
         self.box = box
         self.maxfev = maxfev
-        self.spent = 0
-        self.best = box.low
-        self.least = math.inf
-        self.stalled = False
+        self.spent: int = 0
+        self.best: Floats = box.low
+        self.least: float = math.inf
+        self.stalled: bool = False
         self._objective = objective
         self._args = args
         self._start = start

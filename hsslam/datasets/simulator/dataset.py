@@ -72,15 +72,17 @@ class SimulatedDataset:
         laser_pose: Pose | None = None,
         motion: DriveModel | None = None,
     ) -> None:
-        self.plan = floor_plan(name) if isinstance(name, str) else name
-        self.seed = seed
-        self.count = DEFAULT_SCANS.get(self.plan.name, 400) if scans is None else scans
+        self.plan: FloorPlan = floor_plan(name) if isinstance(name, str) else name
+        self.seed: int = seed
+        self.count: int = DEFAULT_SCANS.get(self.plan.name, 400) if scans is None else scans
         if self.count < 1:
             raise ConfigError(f"a simulated log has at least one scan, found {self.count}")
-        self.laser = laser_model(laser)
-        self.odometry_model = odometry or OdometryModel()
-        self.laser_pose = np.zeros(3) if laser_pose is None else np.asarray(laser_pose, dtype=np.float64)
-        self.motion = motion or DriveModel()
+        self.laser: LaserModel = laser_model(laser)
+        self.odometry_model: OdometryModel = odometry or OdometryModel()
+        self.laser_pose: Pose = (
+            np.zeros(3) if laser_pose is None else np.asarray(laser_pose, dtype=np.float64)
+        )
+        self.motion: DriveModel = motion or DriveModel()
 
     @property
     def info(self) -> DatasetInfo:
