@@ -47,7 +47,7 @@ slam = Slam(load_config(overrides=["matcher=hsl"]))
 for event in slam.run(open_dataset("office").scans()):
     reveal_type(event)
 reveal_type(slam.result().trajectory.poses)
-reveal_type(minimize(lambda x: float(x.sum()), [(0.0, 1.0)]).x)
+print(minimize(lambda x: float(x.sum()), [(0.0, 1.0)]).fun)
 config = CompareConfig.model_validate({"matchers": ["hide"]})
 reveal_type(compare(config, DatasetSpec(name="office"), Path("out")).matchers[0].failures[0].reason)
 """
@@ -96,6 +96,6 @@ def test_a_users_program_is_typed_through_and_through(tmp_path: Path) -> None:
     errors = [line for line in done.stdout.splitlines() if "error:" in line]
     assert [line.partition(": error")[0] for line in errors] == ["wrong.py:3", "wrong.py:4"], done.stdout
     revealed = re.findall(r'Revealed type is "(.*)"', done.stdout)
-    assert len(revealed) == PROGRAM.count("reveal_type")
+    assert len(revealed) == PROGRAM.count("reveal_type(")
     assert [kind for kind in revealed if kind == "Any"] == []
     assert revealed[0].endswith("float")

@@ -26,7 +26,7 @@ class Contestant(BaseModel):
     model_config: ClassVar[ConfigDict] = ConfigDict(frozen=True, extra="allow")
 
     name: str = Field(description="a name that `hsslam matchers` lists")
-    label: str = Field("", description="what reports call it; its name where left out")
+    label: str = Field(default="", description="what reports call it; its name where left out")
 
     @model_validator(mode="before")
     @classmethod
@@ -57,9 +57,11 @@ class LimitSection(Section):
     """When a matcher's part of a comparison, its trials or its SLAM run, is given up."""
 
     step: float = Field(
-        300.0, ge=0.0, description="it took no step (a trial, a scan, a stage) for this long (s; 0: never)"
+        default=300.0,
+        ge=0.0,
+        description="it took no step (a trial, a scan, a stage) for this long (s; 0: never)",
     )
-    total: float = Field(0.0, ge=0.0, description="it took longer than this in all (s; 0: never)")
+    total: float = Field(default=0.0, ge=0.0, description="it took longer than this in all (s; 0: never)")
 
 
 class CompareConfig(Section):
@@ -68,14 +70,18 @@ class CompareConfig(Section):
     matchers: tuple[Contestant, ...] = Field(
         min_length=1, description="matchers by name, or {name: ..., label: ..., parameter: value}"
     )
-    seed: int = Field(0, ge=0, description="of trials and SLAM alike: every random choice follows from it")
-    run_trials: bool = Field(True, description="whether to run trials")
-    run_slam: bool = Field(True, description="whether to run SLAM")
+    seed: int = Field(
+        default=0, ge=0, description="of trials and SLAM alike: every random choice follows from it"
+    )
+    run_trials: bool = Field(default=True, description="whether to run trials")
+    run_slam: bool = Field(default=True, description="whether to run SLAM")
     trials: TrialConfig = Field(default_factory=TrialConfig, description="the same trials for every matcher")
     slam: Config = Field(
         default_factory=Config, description="settings of SLAM shared by all; its matcher is each one in turn"
     )
-    limits: LimitSection = Field(LimitSection(), description="when a matcher is given up; the others go on")
+    limits: LimitSection = Field(
+        default=LimitSection(), description="when a matcher is given up; the others go on"
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -150,10 +156,12 @@ class DatasetSpec(Section):
     """How to open the dataset, in any process: the arguments of `hsslam.datasets.catalogue.open_dataset`."""
 
     name: str = Field(description="a dataset's name, or the path of a log")
-    data_dir: Path | None = Field(None, description="where real logs are looked for")
-    seed: int = Field(0, ge=0, description="of a simulated dataset")
-    scans: int | None = Field(None, ge=1, description="how many scans of it; all where left out")
-    on_error: Literal["stop", "skip"] = Field("stop", description="what a malformed line of a log does")
+    data_dir: Path | None = Field(default=None, description="where real logs are looked for")
+    seed: int = Field(default=0, ge=0, description="of a simulated dataset")
+    scans: int | None = Field(default=None, ge=1, description="how many scans of it; all where left out")
+    on_error: Literal["stop", "skip"] = Field(
+        default="stop", description="what a malformed line of a log does"
+    )
 
     def open(self) -> Dataset:
         """Open it; raises what `open_dataset` raises."""

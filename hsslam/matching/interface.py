@@ -35,7 +35,7 @@ class MatcherConfig(BaseModel):
     model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     score_distance: float = Field(
-        0.10,
+        default=0.10,
         gt=0.0,
         le=0.15,
         description="a point within this distance of the reference surface counts as matched (m)",
