@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import difflib
 import importlib.util
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -55,6 +56,7 @@ class Registry(Generic[T]):
         self._registered: dict[str, T] = {}
         self._files: dict[str, str] = {}
         self._searched: set[str] = set()
+        self._loaded: dict[tuple[str, tuple[str, ...]], T] = {}
 
     def names(self) -> list[str]:
         """All names, the built-in ones first, else sorted; no plugin but the named files is imported."""
@@ -101,6 +103,10 @@ class Registry(Generic[T]):
         known = self._known()
         if name in known:
             return known[name]
+        # Looking through the installed packages takes a millisecond; a search asks at every reference.
+        here = (name, tuple(sys.path))
+        if here in self._loaded:
+            return self._loaded[here]
         declared = self._entry_points().get(name)
         if declared is None:
             raise ConfigError(f"no {self.kind} is named {name!r}{self.suggest(name)}")
@@ -112,8 +118,8 @@ class Registry(Generic[T]):
         if fault := self._fault(loaded):
             reason = f"{declared.value} {fault}"
             raise UnavailableError(name, reason, self.remedy(name), self.kind)
-        part: T = loaded
-        return part
+        self._loaded[here] = loaded
+        return self._loaded[here]
 
     def origin(self, name: str) -> str:
         """The distribution or file that a part comes from; ``registered`` for one that a program registered."""

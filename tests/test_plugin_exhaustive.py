@@ -13,7 +13,8 @@ from hsslam.kernels.correlative import SIDES, pool
 from hsslam.kernels.fitness import count_hits
 from hsslam.matching import Pose, SearchWindow, create
 from hsslam.search.exhaustive import ExhaustiveReference, cell_turn, lattice_search, window_search
-from hsslam.search.fitness import FITNESS_NAMES, HitFitness
+from hsslam.search.fitness import HitFitness
+from hsslam.search.fitness_functions import fitness_names
 
 WINDOW = SearchWindow(0.15, 0.1, np.radians(4.0))
 
@@ -41,7 +42,7 @@ def test_pooled_maxima_are_the_maxima_of_squares(rows: int, columns: int, seed: 
         assert pooled[:, row, column].tolist() == expected
 
 
-@pytest.mark.parametrize("name", FITNESS_NAMES)
+@pytest.mark.parametrize("name", fitness_names())
 def test_the_best_of_the_lattice_is_what_brute_force_finds(room_pair, name) -> None:
     first, second, truth = room_pair
     reference = ExhaustiveReference(first, name, 0.03, 0.025)
@@ -58,7 +59,7 @@ def test_the_best_of_the_lattice_is_what_brute_force_finds(room_pair, name) -> N
         assert found.evaluations < len(poses)
 
 
-@pytest.mark.parametrize("name", FITNESS_NAMES)
+@pytest.mark.parametrize("name", fitness_names())
 def test_no_pose_of_the_window_is_above_the_bound(room_pair, name) -> None:
     first, second, truth = room_pair
     reference = ExhaustiveReference(first, name, 0.03, 0.025)
@@ -86,7 +87,7 @@ def test_a_proof_given_up_says_so(room_pair) -> None:
     assert result.diagnostics["fitness_bound"] > result.diagnostics["fitness"] + 0.005
 
 
-@pytest.mark.parametrize("fitness", FITNESS_NAMES)
+@pytest.mark.parametrize("fitness", fitness_names())
 def test_no_search_is_above_it(room_pair, fitness) -> None:
     first, second, truth = room_pair
     settings_ = {"fitness": fitness, "refine": False, "half_side": 0.03}

@@ -1,7 +1,10 @@
 """Population searches over a box around a guess: harmony search, differential evolution, HIDE, genetic."""
 
 from hsslam.kernels.random import seed_of
-from hsslam.search.fitness import FITNESS_NAMES, HitFitness
+from hsslam.kernels.raster import Raster
+from hsslam.kernels.surface import Surface
+from hsslam.search.fitness import HitFitness
+from hsslam.search.fitness_functions import FitnessFunction, fitness_names, register_fitness
 from hsslam.search.genetic import genetic_search
 from hsslam.search.harmony import harmony_search
 from hsslam.search.hide import hide_search
@@ -14,15 +17,19 @@ from hsslam.search.population import (
 )
 
 __all__ = [
-    "FITNESS_NAMES",
     "NO_TRACE",
+    "FitnessFunction",
     "HitFitness",
     "PopulationConfig",
     "PopulationMatcher",
     "PopulationReference",
+    "Raster",
+    "Surface",
+    "fitness_names",
     "genetic_search",
     "harmony_search",
     "hide_search",
     "minimize",
+    "register_fitness",
     "seed_of",
 ]

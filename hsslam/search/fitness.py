@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +11,9 @@ from hsslam.kernels.fitness import scale
 from hsslam.kernels.raster import Raster
 from hsslam.kernels.surface import Surface
 from hsslam.se2 import Points
+from hsslam.search.fitness_functions import FitnessName, load_fitness
 
-FitnessName: TypeAlias = Literal["paper", "surface", "likelihood"]
-FITNESS_NAMES: tuple[str, ...] = get_args(FitnessName)
+__all__ = ["FitnessName", "HitFitness", "build_raster"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +64,7 @@ def build_raster(
     Parameters
     ----------
     name : str
-        ``paper``: squares centred on the points, as published. ``surface``: squares along the segments between
-        neighbouring points, so that a wall counts as a wall and not as the beams that happened to hit it.
-        ``likelihood``: a Gaussian of the distance from those segments, in steps of 1/255.
+        See `hsslam.search.fitness_functions`.
     points : Points
         (N, 2) m, the reference.
     surface : Surface
@@ -75,8 +72,4 @@ def build_raster(
     half_side, resolution : float
         Of a square (of ``likelihood``: its standard deviation), and of a cell (m).
     """
-    if name == "paper":
-        return Raster.of_points(points, half_side, resolution)
-    if name == "likelihood":
-        return Raster.smooth(surface.segments, half_side, resolution)
-    return Raster.build(surface.segments, half_side, resolution)
+    return load_fitness(name)(points, surface, half_side, resolution)
