@@ -183,6 +183,14 @@ def _data(data_dir: Path | None) -> Iterator[Finding]:
         )
     else:
         yield Finding("data folder", "ok", str(folder))
+    try:
+        known = catalogue.names()
+    except HsslamError:  # plugin files are broken, which was told
+        known = []
+    for name in known:
+        info = catalogue.describe(name)
+        if info.kind == "unavailable":
+            yield Finding(f"dataset {name}", "broken", info.description, catalogue.remedy(name))
     for name in catalogue.REAL:
         try:
             yield Finding(f"dataset {name}", "ok", str(catalogue.find_log(name, data_dir)))

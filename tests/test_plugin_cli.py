@@ -52,14 +52,16 @@ def test_new_writes_a_package_that_declares_its_matcher(package: Path) -> None:
 @pytest.mark.parametrize(
     "command",
     [
-        ["check", "--select", "E,F,W,I,UP,B,D1,RUF", "--per-file-ignores", "tests/*:D"],
+        ["check", "--select", "E,F,W,I,UP,B,D100,D101,D102,D103,RUF", "--per-file-ignores", "tests/*:D"],
         ["format", "--check", "--diff"],
     ],
 )
 def test_what_new_writes_is_in_good_style(package: Path, command: list[str]) -> None:
-    options = ["--isolated", "--no-cache", "--line-length", "88", package]
+    options = ["--isolated", "--no-cache", "--line-length", "88", "."]
     ruff = shutil.which("ruff", path=Path(sys.executable).parent) or "ruff"
-    done = subprocess.run([ruff, *command, *options], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [ruff, *command, *options], capture_output=True, text=True, check=False, cwd=package
+    )
     assert done.returncode == 0, done.stdout + done.stderr
 
 

@@ -162,6 +162,8 @@ def simulate(
 def _where(name: str, kind: str, data_dir: Path | None) -> str:
     from hsslam.datasets.catalogue import open_dataset
 
+    if kind == "unavailable":
+        return "hsslam doctor"
     if kind == "simulated":
         return "built in"
     try:

@@ -7,10 +7,11 @@ import os
 import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from hsslam.datasets.dataset import Dataset, DatasetInfo
-from hsslam.errors import DataError
+from hsslam.datasets.dataset import Dataset, DatasetInfo, DatasetSource
+from hsslam.errors import ConfigError, DataError, UnavailableError
+from hsslam.registry import Registry
 
 if TYPE_CHECKING:
     from hsslam.io.carmen import OnError
@@ -101,8 +102,8 @@ REAL = {
 
 
 def names() -> list[str]:
-    """Names of all datasets, the simulated ones first."""
-    return [*SIMULATED, *REAL]
+    """Names of all datasets: the simulated ones, the real ones, those of plugins."""
+    return [*SIMULATED, *REAL, *_plugins.names()]
 
 
 def describe(name: str) -> DatasetInfo:
@@ -119,7 +120,45 @@ def describe(name: str) -> DatasetInfo:
         from hsslam.datasets.simulator import DEFAULT_SCANS
 
         return DatasetInfo(name, "simulated", SIMULATED[name], scan_count=DEFAULT_SCANS.get(name))
+    if name in _plugins.names():
+        try:
+            return _plugins.load(name).info
+        except UnavailableError as error:
+            return DatasetInfo(name, "unavailable", error.reason)
     raise DataError(f"no dataset is named {name!r}{_suggest(name)}")
+
+
+GROUP = "hsslam.datasets"
+"""Entry points in this group declare a `DatasetSource`."""
+
+
+def _fault(part: Any) -> str:
+    if not isinstance(part, DatasetSource):
+        return "is no hsslam.datasets.dataset.DatasetSource"
+    if part.info.name in (*SIMULATED, *REAL):
+        return f"has the name of a built-in dataset, {part.info.name}"
+    return ""
+
+
+_plugins: Registry[DatasetSource] = Registry("dataset", GROUP, fault=_fault)
+
+
+def register_dataset(source: DatasetSource) -> None:
+    """Make a dataset known to this process, and by ``--plugin`` to all that it starts, without packaging it.
+
+    Raises
+    ------
+    ConfigError
+        Its name is taken, or it is none.
+    """
+    if fault := _fault(source):
+        raise ConfigError(f"this dataset {fault}")
+    _plugins.register(source.info.name, source)
+
+
+def remedy(name: str) -> str:
+    """Line to type where a plugin's dataset is unavailable."""
+    return _plugins.remedy(name)
 
 
 def data_directory(data_dir: Path | str | None = None) -> Path:
@@ -167,6 +206,9 @@ def open_dataset(
     from hsslam.datasets.file import FileDataset, log_stem
 
     name = str(name_or_path)
+    if name in _plugins.names():
+        source = _plugins.load(name)
+        return source.open(seed=seed, scans=scans, data_dir=data_dir, on_error=on_error)
     if name in SIMULATED:
         from hsslam.datasets.simulator import SimulatedDataset
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from hsslam.io.relations import Relations
     from hsslam.scan import LaserScan
@@ -22,7 +23,8 @@ class DatasetInfo:
     name : str
         What the command line calls it; for a file, its name without suffixes.
     kind : str
-        ``simulated``, ``real`` or ``file``.
+        ``simulated``, ``real``, ``file``, or what a plugin calls its own; ``unavailable`` where a plugin is
+        broken, with the reason for a description.
     description : str
         One line.
     attribution : str
@@ -53,3 +55,28 @@ class Dataset(Protocol):
 
     def relations(self) -> Relations | None:
         """Manually verified relative poses between scans, where there are some (real data)."""
+
+
+class OpenDataset(Protocol):
+    """Opens a dataset; what it has no use for it passes over."""
+
+    def __call__(
+        self, *, seed: int, scans: int | None, data_dir: Path | None, on_error: Literal["stop", "skip"]
+    ) -> Dataset:
+        """Open it; see `hsslam.datasets.catalogue.open_dataset`."""
+
+
+@dataclass(frozen=True)
+class DatasetSource:
+    """A dataset that a plugin brings: what listings show, and how it is opened.
+
+    Parameters
+    ----------
+    info : DatasetInfo
+        Its ``name`` is the one that it is registered under.
+    open : callable
+        Opens it.
+    """
+
+    info: DatasetInfo
+    open: OpenDataset
