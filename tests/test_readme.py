@@ -14,8 +14,10 @@ from typing import Any
 
 import pytest
 import typer
+import yaml
 
 from hsslam.cli.main import app
+from hsslam.version import __version__
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = [
@@ -79,7 +81,8 @@ def parse(line: str) -> None:
 
 
 @pytest.mark.parametrize(("document", "line"), hsslam_commands())
-def test_command_parses(document: str, line: str) -> None:
+def test_command_parses(document: str, line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hsslam.plugin_files.use", lambda file: None)
     parse(line)
 
 
@@ -91,18 +94,19 @@ def test_a_wrong_command_does_not_parse(wrong: str) -> None:
         parse(wrong)
 
 
-def test_readme_examples_run_in_order(tmp_path: Path) -> None:
-    shims, site = tmp_path / "bin", tmp_path / "site"
+def run_blocks(document: Path, place: Path) -> Path:
+    """Write a document's files and run its blocks, in their order; the folder where that happened."""
+    shims, site, work = place / "bin", place / "site", place / "work"
     shims.mkdir()
+    work.mkdir()
     pip = shims / "pip"
     pip.write_text(PIP.format(python=sys.executable, target=site))
     pip.chmod(0o755)
     path = os.pathsep.join([str(shims), str(Path(sys.executable).parent), os.environ["PATH"]])
-    environment = {**os.environ, "PATH": path, "PYTHONPATH": str(site), "MPLBACKEND": "Agg"}
-    work = tmp_path / "work"
-    work.mkdir()
+    import_path = os.pathsep.join(filter(None, [str(site), os.environ.get("PYTHONPATH")]))
+    environment = {**os.environ, "PATH": path, "PYTHONPATH": import_path, "MPLBACKEND": "Agg"}
     ran = 0
-    for block in blocks(ROOT / "README.md"):
+    for block in blocks(document):
         if block.file is not None:
             target = work / block.file
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -121,8 +125,32 @@ def test_readme_examples_run_in_order(tmp_path: Path) -> None:
             assert done.returncode == 0, f"{block.text}\n{done.stdout}\n{done.stderr}"
             ran += 1
     assert ran >= 5
+    return work
+
+
+def test_readme_examples_run_in_order(tmp_path: Path) -> None:
+    work = run_blocks(ROOT / "README.md", tmp_path)
     assert "loop_matcher:\n  name: glasm" in (work / "runs/mine/config.yaml").read_text()
     assert "nearest" in (work / "runs/race/report.md").read_text()
+
+
+def test_the_tutorial_for_extenders_runs_in_order(tmp_path: Path) -> None:
+    work = run_blocks(ROOT / "docs" / "extend.md", tmp_path)
+    assert "my_matcher" in (work / "runs/race/report.md").read_text()
+    assert len((work / "runs/spin/trajectory.tum").read_text().splitlines()) == 20
+
+
+def test_the_citation_names_this_version() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert citation["cff-version"] == "1.2.0"
+    assert str(citation["version"]) == __version__
+    assert citation["references"][0]["doi"].startswith("10.1016/")
+
+
+def test_the_hooks_of_commits_are_tools_of_the_environment() -> None:
+    (local,) = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())["repos"]
+    tools = {hook["entry"].split()[0] for hook in local["hooks"]}
+    assert tools == {".venv/bin/ruff", ".venv/bin/mypy"}
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
