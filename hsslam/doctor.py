@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from hsslam.errors import HsslamError
+from hsslam.probe import tried
 from hsslam.version import __version__
 
 Status: TypeAlias = Literal["ok", "missing", "broken"]
-
-PATIENCE = 120.0
-"""An import that takes longer has failed (s)."""
 
 OWN = "hsslam"
 """The distribution whose matchers share a process; others may crash theirs."""
@@ -106,7 +102,7 @@ def _requirements() -> Iterator[Finding]:
 def _imports() -> Iterator[Finding]:
     """The compiled packages, imported: a version that is installed may still not load."""
     for package in ("gtsam", "scipy.optimize", "matplotlib.figure"):
-        _, fault = _tried(f"import {package}")
+        _, fault = tried(f"import {package}")
         if fault:
             name = package.partition(".")[0]
             yield Finding(name, "broken", fault, f"pip install --force-reinstall {name}")
@@ -114,7 +110,7 @@ def _imports() -> Iterator[Finding]:
 
 def _kernel_cache() -> Finding:
     """Where Numba keeps compiled kernels: without it every run compiles them anew."""
-    found, fault = _tried(
+    found, fault = tried(
         "import json; from hsslam.se2 import compose as k\n"
         "import numpy as np; k(np.zeros(3), np.zeros(3))\n"
         "print(json.dumps(getattr(k._cache, 'cache_path', None)))"
@@ -139,7 +135,7 @@ def _matchers() -> Iterator[Finding]:
         return
     own = [name for name, origin in origins.items() if origin == OWN]
     for names in filter(None, [own, *([name] for name in origins if name not in own)]):
-        told, fault = _tried(
+        told, fault = tried(
             "import json, sys; from dataclasses import asdict; from hsslam.matching import describe\n"
             f"print(json.dumps([asdict(describe(name)) for name in {names!r}]))"
         )
@@ -209,26 +205,3 @@ def _output() -> Finding:
         detail = f"{here} cannot be written: {error.strerror}"
         return Finding("output", "broken", detail, "cd to a folder of yours, or give --out")
     return Finding("output", "ok", f"runs/ below {here}")
-
-
-def _tried(code: str) -> tuple[Any, str]:
-    """Run Python in a process of its own: what its last line says as JSON, and what went wrong."""
-    try:
-        done = subprocess.run(
-            [sys.executable, "-P", "-c", code],
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=PATIENCE,
-            stdin=subprocess.DEVNULL,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return None, f"does not come back within {PATIENCE:g} s"
-    if done.returncode < 0:
-        return None, f"crashes (signal {-done.returncode})"
-    if done.returncode > 0:
-        lines = done.stderr.strip().splitlines()
-        return None, lines[-1] if lines else f"exit code {done.returncode}"
-    lines = done.stdout.strip().splitlines()
-    return (json.loads(lines[-1]) if lines else None), ""

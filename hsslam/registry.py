@@ -55,6 +55,7 @@ class Registry(Generic[T]):
         self._discover = discover
         self._registered: dict[str, T] = {}
         self._files: dict[str, str] = {}
+        self._condemned: dict[str, str] = {}
         self._searched: set[str] = set()
         self._loaded: dict[tuple[str, tuple[str, ...]], T] = {}
 
@@ -110,6 +111,8 @@ class Registry(Generic[T]):
         declared = self._entry_points().get(name)
         if declared is None:
             raise ConfigError(f"no {self.kind} is named {name!r}{self.suggest(name)}")
+        if name in self._condemned:
+            raise UnavailableError(name, self._condemned[name], self.remedy(name), self.kind)
         try:
             loaded = declared.load()
         except (Exception, SystemExit) as error:  # a plugin's import may fail in any way
@@ -120,6 +123,14 @@ class Registry(Generic[T]):
             raise UnavailableError(name, reason, self.remedy(name), self.kind)
         self._loaded[here] = loaded
         return self._loaded[here]
+
+    def is_foreign(self, name: str) -> bool:
+        """Whether a part comes from an installed package other than hsslam."""
+        return name in self._entry_points() and self.origin(name) != "hsslam"
+
+    def condemn(self, name: str, reason: str) -> None:
+        """Never import a part in this process: it was seen to crash or hang another."""
+        self._condemned[name] = reason
 
     def origin(self, name: str) -> str:
         """The distribution or file that a part comes from; ``registered`` for one that a program registered."""

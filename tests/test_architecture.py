@@ -41,6 +41,7 @@ ALLOWED = {
         "hsslam.kernels",
         "hsslam.se2",
         "hsslam.errors",
+        "hsslam.probe",
         "hsslam.registry",
         "hsslam.validation",
     ),

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -20,6 +22,7 @@ from hsslam.matching import (
     register,
     registry,
 )
+from hsslam.probe import tried
 
 BUILT_IN = {"glasm", "hide", "hsl", "icp", "kiss_icp"}
 
@@ -105,6 +108,33 @@ def test_a_broken_plugin_is_listed_as_such_and_takes_nothing_down(
     assert info.origin == "broken-package"
     assert describe("hide").available
     assert create("hide").config.memory_size == 30
+
+
+@pytest.mark.parametrize(
+    ("module", "reason"),
+    [
+        ("import ctypes\nctypes.string_at(0)\n", r"its import crashes \(signal 11\)"),
+        ("import time\ntime.sleep(3600)\n", "its import does not come back within 3 s"),
+    ],
+)
+def test_a_plugin_whose_import_crashes_or_hangs_is_kept_out(
+    site: Path, monkeypatch: pytest.MonkeyPatch, module: str, reason: str
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(site), os.environ.get("PYTHONPATH", "")]))
+    monkeypatch.setattr("hsslam.matching.registry.tried", partial(tried, patience=3.0))
+    monkeypatch.setattr(registry._matchers, "_condemned", {})
+    install(site, "deadly-package", {"deadly": "deadly_module:Deadly"}, {"deadly_module": module})
+    registry.quarantine(["deadly", "hide", "no such name"])
+    with pytest.raises(MatcherUnavailableError, match=reason):
+        load("deadly")
+    assert describe("deadly").remedy == "pip install --force-reinstall deadly-package"
+
+
+def test_quarantine_lets_the_sound_ones_pass(site: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(site), os.environ.get("PYTHONPATH", "")]))
+    install(site, "stay-put", {"stay": "stay_put:Stay"}, {"stay_put": GOOD})
+    registry.quarantine(["stay"])
+    assert describe("stay").available
 
 
 def test_making_a_broken_matcher_says_why_and_what_to_type(site: Path) -> None:

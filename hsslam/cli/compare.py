@@ -197,6 +197,7 @@ def resolve(
         of_name = {item.get("label") or item.get("name"): item for item in listed}
         listed = [of_name.get(name, {"name": name}) for name in names]
     listed = listed or [{"name": name} for name in DEFAULT_MATCHERS]
+    registry.quarantine(str(item.get("name")) for item in listed)
     contestants = {str(item.get("label") or item.get("name")): item for item in listed}
     slam = dict(data.get("slam") or {})
     trials = dict(data.get("trials") or {})

@@ -27,6 +27,7 @@ def show(as_json: AsJson = False, plugin: Plugin = None) -> None:
 
     from hsslam.matching import registry
 
+    registry.quarantine(registry.names())
     infos = [registry.describe(name) for name in registry.names()]
     if as_json:
         console.print_json([asdict(info) for info in infos])

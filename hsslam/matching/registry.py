@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from hsslam.errors import ConfigError, HsslamError, MatcherUnavailableError, UnavailableError
 from hsslam.matching.interface import Matcher, MatcherConfig
+from hsslam.probe import CRASHES, tried
 from hsslam.registry import Registry
 from hsslam.validation import explain
 
@@ -84,6 +85,20 @@ def names() -> list[str]:
 def origin(name: str) -> str:
     """The distribution or file that a matcher comes from; ``registered`` for one that a program registered."""
     return _matchers.origin(name)
+
+
+def quarantine(wanted: Iterable[str]) -> None:
+    """Import matchers of other packages in a process of their own first.
+
+    One whose import crashes or hangs there is unavailable from then on, and does not do so here. Those that
+    hsslam brings, and files that are named, are trusted.
+    """
+    for name in sorted(set(wanted) & set(names())):
+        if not _matchers.is_foreign(name):
+            continue
+        _, fault = tried(f"from hsslam.matching import load; load({name!r})")
+        if fault.startswith(CRASHES):
+            _matchers.condemn(name, f"its import {fault}")
 
 
 def load(name: str) -> type[Matcher[Any]]:
