@@ -64,9 +64,14 @@ class PopulationReference(Reference):
         """The reference with (N, 2) more points; takes this one's rasters over."""
         known = len(self.surface.segments)
         surface = self.surface.extended(points)
-        added = np.hstack((points, points)) if self._config.fitness == "paper" else surface.segments[known:]
         every = np.vstack((self.points, points))
-        return PopulationReference(every, self._config, surface, self.raster.extended(added))
+        # A plugin's raster may follow from all the points in any way: only our own are known to grow.
+        raster = None
+        if self._config.fitness == "paper":
+            raster = self.raster.extended(np.hstack((points, points)))
+        elif self._config.fitness in ("surface", "likelihood"):
+            raster = self.raster.extended(surface.segments[known:])
+        return PopulationReference(every, self._config, surface, raster)
 
     def _build(self, scale: float) -> Raster:
         config = self._config
