@@ -150,7 +150,7 @@ class GraphSection(Section):
         0.1, gt=0.0, description="standard deviation per metre where odometry stands in for a match (m/m)"
     )
     odometry_std_theta_deg: float = Field(
-        8.0, gt=0.0, description="its standard deviation of heading per radian turned or metre driven (deg)"
+        20.0, gt=0.0, description="its standard deviation of heading per radian turned or metre driven (deg)"
     )
     refine_rounds: int = Field(
         1, ge=0, description="rounds of matching overlapping keyframes again at the end"
