@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hsslam.kernels.assess import assess, degenerate_direction
-from hsslam.kernels.fitness import count_hits
+from hsslam.kernels.fitness import count_hits, interpolate_points
 from hsslam.kernels.raster import Raster
 from hsslam.kernels.refine import refine, solve3
 from hsslam.kernels.surface import Surface
@@ -220,3 +220,43 @@ def test_covariance_holds_the_way_to_the_bottom() -> None:
     _, beside, _ = assess(surface, points, off, WINDOW, 0.1)
     assert off @ np.linalg.solve(at_truth, off) > 20.0
     assert off @ np.linalg.solve(beside, off) < 3.0
+
+
+@given(clouds, poses)
+@settings(deadline=None, max_examples=30)
+def test_interpolated_worth_agrees_with_numpy(points: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
+    raster = build(True, points)
+    near = pose * [0.02, 0.02, 0.01]
+    fitness = HitFitness.of(raster, points)
+    found = interpolate_points(
+        raster.cells.ravel(), raster.cells.shape, raster.frame, *fitness.scaled, fitness.count, *near, 0
+    )
+    c, s = np.cos(near[2]), np.sin(near[2])
+    placed = points @ np.array([[c, s], [-s, c]]) + near[:2]
+    u, v = ((placed - raster.frame[:2]) * raster.frame[2] - 0.5).T
+    columns, rows = np.floor(u).astype(int), np.floor(v).astype(int)
+    p, q, cells = u - columns, v - rows, raster.cells.astype(float)
+    low = cells[rows, columns] * (1 - p) + cells[rows, columns + 1] * p
+    high = cells[rows + 1, columns] * (1 - p) + cells[rows + 1, columns + 1] * p
+    assert found == pytest.approx((low * (1 - q) + high * q).sum(), rel=2e-3, abs=2.0)
+
+
+def test_interpolation_tells_poses_apart_within_a_cell() -> None:
+    points = corner()
+    raster = Raster.smooth(Surface.build(points).segments, 0.05, 0.025)
+    fitness = HitFitness.of(raster, points)
+    worth = [
+        interpolate_points(
+            raster.cells.ravel(),
+            raster.cells.shape,
+            raster.frame,
+            *fitness.scaled,
+            fitness.count,
+            x,
+            x,
+            0.0,
+            0,
+        )
+        for x in (0.0, 0.003, 0.006, 0.009, 0.012)
+    ]
+    assert (np.diff(worth) < 0).all()

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.fitness import count_points, scratch
+from hsslam.kernels.fitness import evaluate, scratch
 from hsslam.kernels.random import below, seeded, uniform
 from hsslam.se2 import Pose
 
@@ -86,7 +86,7 @@ def genetic_search(
             x = decode(genes[i, 0], bits, guess[0], half[0])
             y = decode(genes[i, 1], bits, guess[1], half[1])
             theta = decode(genes[i, 2], bits, guess[2], half[2])
-            hits[i] = count_points(flat, cells.shape, frame, xs, ys, count, x, y, theta, 0, index)
+            hits[i] = evaluate(flat, cells.shape, frame, xs, ys, count, x, y, theta, 0, index)
             if hits[i] > best_hits:
                 best_hits = hits[i]
                 best_genes[:] = genes[i]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.fitness import count_points, scratch
+from hsslam.kernels.fitness import evaluate, scratch
 from hsslam.kernels.random import below, seeded, uniform
 from hsslam.se2 import Pose
 
@@ -75,7 +75,7 @@ def fill_memory(
         for d in range(3):
             offset = 0.0 if i == 0 else (2.0 * uniform(state) - 1.0) * half[d]
             memory[i, d] = guess[d] + offset
-        hits[i] = count_points(
+        hits[i] = evaluate(
             flat, cells.shape, frame, xs, ys, count, memory[i, 0], memory[i, 1], memory[i, 2], 0, index
         )
         if i < trace.shape[0]:
@@ -148,7 +148,7 @@ def harmony_search(
         rate = par_min + (par_max - par_min) * t / improvisations
         improvise(memory, guess, half, memory_considering_rate, rate, bandwidth, state, candidate)
         x, y, theta = candidate
-        found = count_points(flat, cells.shape, frame, xs, ys, count, x, y, theta, hits[worst] + 1, index)
+        found = evaluate(flat, cells.shape, frame, xs, ys, count, x, y, theta, hits[worst] + 1, index)
         if found > hits[worst]:
             memory[worst] = candidate
             hits[worst] = found

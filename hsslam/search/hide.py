@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.fitness import count_points, scratch
+from hsslam.kernels.fitness import evaluate, scratch
 from hsslam.kernels.random import below, seeded, uniform
 from hsslam.se2 import Pose
 from hsslam.search.harmony import fill_memory, improvise, narrowing, record
@@ -110,7 +110,7 @@ bandwidth_min, bandwidth_max, patience, seed, trace
             rate = par_min + (par_max - par_min) * spent / budget
             improvise(memory, guess, half, memory_considering_rate, rate, bandwidth, state, candidate)
             x, y, theta = candidate
-            found = count_points(flat, cells.shape, frame, xs, ys, count, x, y, theta, hits[worst] + 1, index)
+            found = evaluate(flat, cells.shape, frame, xs, ys, count, x, y, theta, hits[worst] + 1, index)
             for d in range(3):
                 bandwidth[d] *= shrink[d]
             spent += 1
@@ -126,9 +126,7 @@ bandwidth_min, bandwidth_max, patience, seed, trace
         for target in range(min(memory_size, budget - spent)):
             evolve(memory, target, best, guess, half, attraction, weight, crossover_rate, state, candidate)
             x, y, theta = candidate
-            found = count_points(
-                flat, cells.shape, frame, xs, ys, count, x, y, theta, hits[target] + 1, index
-            )
+            found = evaluate(flat, cells.shape, frame, xs, ys, count, x, y, theta, hits[target] + 1, index)
             spent += 1
             idle += 1
             if found > hits[target]:
