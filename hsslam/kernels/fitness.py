@@ -13,6 +13,9 @@ from hsslam.se2 import Points
 CHUNK = 32
 """Points counted between two looks at whether the candidate can still win."""
 
+PARTS = 64
+"""Steps of a cell's width in which places are interpolated."""
+
 NOWHERE = 1e30
 """Coordinate of a point that is worth nothing wherever the scan is."""
 
@@ -160,36 +163,43 @@ def interpolate_points(
     y: float,
     theta: float,
     at_least: int,
+    index: NDArray[np.uint32],
 ) -> int:
     """As `count_points`, with the worth of a place interpolated between the four cells whose centres surround it.
 
     What a smooth field is worth then has no steps at the borders of cells, and a pose is told from one a
     fraction of a cell away.
     """
-    columns = shape[1]
-    right, top = np.float32(columns - 2), np.float32(shape[0] - 2)
-    zero = np.float32(0.0)
+    right, top = np.float32(shape[1] - 2), np.float32(shape[0] - 2)
+    zero, parts = np.float32(0.0), np.float32(PARTS)
     c, s = np.float32(math.cos(theta)), np.float32(math.sin(theta))
     # Half a cell less, so that a cell's centre has whole coordinates.
     tx = np.float32((x - frame[0]) * frame[2] - 0.5)
     ty = np.float32((y - frame[1]) * frame[2] - 0.5)
-    most = frame[3]
-    total = np.float32(0.0)
-    for start in range(0, count, CHUNK):
-        for i in range(start, min(start + CHUNK, count)):
-            u = min(max(c * xs[i] - s * ys[i] + tx, zero), right)
-            v = min(max(s * xs[i] + c * ys[i] + ty, zero), top)
+    stride, below = np.int32(shape[1]), np.uint32(shape[1])
+    most = int(frame[3])
+    across, up = np.empty(CHUNK, dtype=np.int32), np.empty(CHUNK, dtype=np.int32)
+    worth = 0
+    start = 0
+    while start < count:
+        for i in range(CHUNK):
+            px, py = xs[start + i], ys[start + i]
+            u = min(max(c * px - s * py + tx, zero), right)
+            v = min(max(s * px + c * py + ty, zero), top)
             column, row = np.int32(u), np.int32(v)
-            p, q = u - np.float32(column), v - np.float32(row)
-            k = np.uint64(row) * np.uint64(columns) + np.uint64(column)
-            above = k + np.uint64(columns)
-            here, beside = np.float32(flat[k]), np.float32(flat[k + np.uint64(1)])
-            over, across = np.float32(flat[above]), np.float32(flat[above + np.uint64(1)])
-            near = here + p * (beside - here)
-            total += near + q * (over + p * (across - over) - near)
-        if total + most * max(count - start - CHUNK, 0) < at_least:
+            index[i] = row * stride + column
+            across[i] = np.int32((u - np.float32(column)) * parts)
+            up[i] = np.int32((v - np.float32(row)) * parts)
+        for i in range(CHUNK):
+            k = index[i]
+            p, q = across[i], up[i]
+            near = flat[k] * (PARTS - p) + flat[k + np.uint32(1)] * p
+            far = flat[k + below] * (PARTS - p) + flat[k + below + np.uint32(1)] * p
+            worth += near * (PARTS - q) + far * q
+        start += CHUNK
+        if worth + PARTS * PARTS * most * max(count - start, 0) < PARTS * PARTS * at_least:
             return -1
-    return int(total)
+    return worth // (PARTS * PARTS)
 
 
 @kernel
@@ -208,5 +218,5 @@ def evaluate(
 ) -> int:
     """What the population searches maximise: hits counted on squares, likelihood interpolated in a smooth field."""
     if frame[3] > 1.0:
-        return interpolate_points(flat, shape, frame, xs, ys, count, x, y, theta, at_least)
+        return interpolate_points(flat, shape, frame, xs, ys, count, x, y, theta, at_least, index)
     return count_points(flat, shape, frame, xs, ys, count, x, y, theta, at_least, index)
