@@ -226,7 +226,7 @@ def test_covariance_holds_the_way_to_the_bottom() -> None:
 @settings(deadline=None, max_examples=30)
 def test_interpolated_worth_agrees_with_numpy(points: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
     raster = build(True, points)
-    near = pose * [0.02, 0.02, 0.01]
+    near = pose * [0.005, 0.005, 0.003]
     fitness = HitFitness.of(raster, points)
     found = interpolate_points(
         raster.cells.ravel(),
