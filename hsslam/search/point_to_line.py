@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hsslam.kernels.refine import refine
 from hsslam.kernels.surface import rasterise_nearest
 from hsslam.matching.interface import Reference
@@ -24,7 +27,7 @@ class PointToLineReference(Reference):
 
     def __init__(self, points: Points, reach: float) -> None:
         super().__init__(points)
-        self.far: NDArray[np.int32]
+        self.far: NDArray[np.uint32]
         self.far_frame: NDArray[np.float64]
         self.far, self.far_frame = rasterise_nearest(self.surface.segments, RESOLUTION, reach)
 
