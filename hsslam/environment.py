@@ -10,9 +10,12 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from hsslam import plugin_files
 from hsslam.version import __version__
 
 _PACKAGES = ("numpy", "numba", "scipy", "gtsam", "pydantic", "matplotlib", "kiss-icp", "open3d", "open3d-cpu")
+
+_GROUPS = ("hsslam.matchers", "hsslam.fitness", "hsslam.readers", "hsslam.datasets")
 
 
 def environment() -> dict[str, Any]:
@@ -21,13 +24,15 @@ def environment() -> dict[str, Any]:
     Returns
     -------
     dict
-        ``hsslam``, ``python``, ``packages`` (name to version, of those installed), ``cpu`` (model),
-        ``cores`` (that this process may use), ``system``, ``machine``; JSON types only.
+        ``hsslam``, ``python``, ``packages`` (name to version, of those installed), ``plugins`` (packages that
+        extend hsslam, name to version; files of plugins, name to sha256 sum), ``cpu`` (model), ``cores`` (that
+        this process may use), ``system``, ``machine``; JSON types only.
     """
     return {
         "hsslam": __version__,
         "python": platform.python_version(),
         "packages": _versions(),
+        "plugins": _plugins(),
         "cpu": cpu_model(),
         "cores": _cores(),
         "system": f"{platform.system()} {platform.release()}",
@@ -64,6 +69,12 @@ def _versions() -> dict[str, str]:
         except metadata.PackageNotFoundError:
             continue
     return found
+
+
+def _plugins() -> dict[str, str]:
+    declared = [entry.dist for group in _GROUPS for entry in metadata.entry_points(group=group)]
+    packages = {dist.name: dist.version for dist in declared if dist is not None and dist.name != "hsslam"}
+    return {**dict(sorted(packages.items())), **plugin_files.fingerprints()}
 
 
 def peak_memory_mb() -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import shutil
 import subprocess
 import sys
@@ -106,6 +108,8 @@ def test_a_file_matches_and_runs(package: Path, tmp_path: Path, monkeypatch: pyt
     ran = hsslam("run", "office", "--scans", 20, *options, "--out", "run", "--quiet")
     assert ran.exit_code == 0, ran.stderr
     assert "reach: 0.25" in Path("run/config.yaml").read_text()
+    told = json.loads(Path("run/environment.json").read_text())["plugins"]
+    assert told["my_first_matcher.py"] == hashlib.sha256(file.read_bytes()).hexdigest()
 
 
 BAD = """
