@@ -190,7 +190,8 @@ class LoopCloser:
         step = max(size // 2, 1)
         number = first // step
         place = self._places.pop(number, None)
-        if place is None:
+        # With a small min_gap, a submap made when the log was young may end before a later candidate.
+        if place is None or first >= place.first + len(place.poses):
             middle = number * step + step // 2
             low = max(middle - size // 2, 0)
             high = min(middle + size // 2 + 1, len(poses) - 1)
