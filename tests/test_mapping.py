@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from conftest import room_scan_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -19,7 +20,6 @@ from hsslam.mapping.sharpness import sharpness
 from hsslam.scan import LaserScan, ScanGeometry
 from hsslam.se2 import compose
 from hsslam.trajectory import Trajectory
-from tests.conftest import room_scan_at
 
 
 def line(start: tuple[int, int], end: tuple[int, int]) -> list[tuple[int, int]]:
