@@ -55,6 +55,7 @@ from hsslam.io import carmen_messages as messages
 from hsslam.io.carmen_messages import Laser, LogState, MalformedError
 from hsslam.io.carmen_writer import CarmenWriter
 from hsslam.io.compressed import read_lines
+from hsslam.io.log_statistics import LogStatistics
 from hsslam.scan import LaserScan
 
 __all__ = ["LOOK_AHEAD", "CarmenStatistics", "CarmenWriter", "OnError", "read_carmen"]
@@ -63,8 +64,6 @@ OnError: TypeAlias = Literal["stop", "skip"]
 
 LOOK_AHEAD = 1000
 """Lines looked at, before the first scan is given out, to see which messages the log holds."""
-
-_REASONS_KEPT = 5
 
 _Parser: TypeAlias = Callable[[messages.Words, LogState, int], LaserScan]
 
@@ -79,8 +78,10 @@ _WITHOUT_POSE: dict[Laser, dict[bytes, _Parser]] = {
 
 
 @dataclass
-class CarmenStatistics:
+class CarmenStatistics(LogStatistics):
     """What a reader saw; filled while it reads.
+
+    Its fields beside those of `LogStatistics`:
 
     Parameters
     ----------
@@ -92,18 +93,12 @@ class CarmenStatistics:
         ``ODOM`` lines.
     ignored : Counter
         Messages passed over, by name; comments under ``#``.
-    skipped : int
-        Malformed lines left out (``on_error="skip"``).
-    reasons : list of str
-        Line number and reason of the first few of them.
     """
 
     lines: int = 0
     scans: Counter[str] = field(default_factory=Counter)
     odometry: int = 0
     ignored: Counter[str] = field(default_factory=Counter)
-    skipped: int = 0
-    reasons: list[str] = field(default_factory=list)
 
 
 def read_carmen(
@@ -186,9 +181,7 @@ def _scans(
                     f"{path}:{number}: {error}; mend or delete the line, or have such lines skipped "
                     "(on_error skip)"
                 ) from error
-            statistics.skipped += 1
-            if len(statistics.reasons) < _REASONS_KEPT:
-                statistics.reasons.append(f"line {number}: {error}")
+            statistics.skip(f"line {number}: {error}")
     if not index:
         raise DataError(_why_no_scans(path, state.laser, statistics))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -48,6 +48,10 @@ class CarmenWriter:
     path : path
         The log; ``.gz`` and ``.bz2`` at its end ask for compression. It appears under its name when the
         block ends without an exception.
+    exact : bool
+        Write every number with as many digits as give it back to the last bit, for conversions that must not
+        change a result. Only the pose of a laser that ``FLASER`` cannot tell is still rounded: the format
+        holds its sum with the robot's pose.
 
     Raises
     ------
@@ -55,8 +59,9 @@ class CarmenWriter:
         On entering: the folder cannot be written to.
     """
 
-    def __init__(self, path: Path | str) -> None:
+    def __init__(self, path: Path | str, *, exact: bool = False) -> None:
         self.path = Path(path)
+        self._exact = exact
         self._stack = ExitStack()
         self._stream: BinaryIO | None = None
         self._start = 0.0
@@ -84,20 +89,20 @@ class CarmenWriter:
         if not self.count:
             self._begin(scan)
         self.count += 1
-        x, y, theta = scan.odometry
-        after = f"{scan.stamp:.6f} nohost {scan.stamp - self._start:.6f}\n"
-        robot = f"{x:.9f} {y:.9f} {theta:.9f}"
-        laser = "{:.9f} {:.9f} {:.9f}".format(*_placed(scan.odometry, scan.laser_pose))
+        stamp = repr(float(scan.stamp)) if self._exact else f"{scan.stamp:.6f}"
+        after = f"{stamp} nohost {scan.stamp - self._start:.6f}\n"
+        robot = self._pose_text(scan.odometry)
+        laser = self._pose_text(_placed(scan.odometry, scan.laser_pose))
         odom = f"ODOM {robot} 0 0 0 {after}"
         n = len(scan.ranges)
         if self._fits_flaser(scan):
-            line = f"FLASER {n} {_text(_written(scan, _NO_RETURN))}{laser} {robot} {after}"
+            line = f"FLASER {n} {self._ranges_text(scan, _NO_RETURN)}{laser} {robot} {after}"
         else:
             g = scan.geometry
             view = g.angle_increment * max(n - 1, 0)
             numbers = (g.angle_min, view, g.angle_increment, g.range_max)
             config = "0 {!r} {!r} {!r} {!r} 0.01 0".format(*map(float, numbers))
-            ranges = _text(_written(scan, g.range_max))
+            ranges = self._ranges_text(scan, g.range_max)
             line = f"ROBOTLASER1 {config} {n} {ranges}0 {laser} {robot} 0 0 0 0 0 {after}"
         self._put(odom + line)
 
@@ -114,7 +119,7 @@ class CarmenWriter:
         if not self._fits_flaser(scan):
             self._offset, self._range_max = 0.0, FLASER_RANGE_MAX
         self._put(
-            f"{_HEADER}PARAM robot_frontlaser_offset {self._offset:.9f} nohost 0\n"
+            f"{_HEADER}PARAM robot_frontlaser_offset {self._offset!r} nohost 0\n"
             f"PARAM robot_front_laser_max {float(self._range_max)!r} nohost 0\n"
         )
 
@@ -123,11 +128,24 @@ class CarmenWriter:
         if beams not in _FLASER_BEAMS or not 0.0 < g.range_max <= FLASER_RANGE_MAX:
             return False
         start, step = beam_start_and_step(beams)
+        tolerance = 0.0 if self._exact else 1e-9
         return (
-            abs(g.angle_min - start) < 1e-9
-            and abs(g.angle_increment - step) < 1e-9
+            abs(g.angle_min - start) <= tolerance
+            and abs(g.angle_increment - step) <= tolerance
             and g.range_max == self._range_max
-            and bool(np.abs(scan.laser_pose - (self._offset, 0.0, 0.0)).max() < 1e-9)
+            and bool(np.abs(scan.laser_pose - (self._offset, 0.0, 0.0)).max() <= tolerance)
+        )
+
+    def _pose_text(self, pose: Sequence[float] | Pose) -> str:
+        x, y, theta = map(float, pose)
+        return f"{x!r} {y!r} {theta!r}" if self._exact else f"{x:.9f} {y:.9f} {theta:.9f}"
+
+    def _ranges_text(self, scan: LaserScan, no_return: float) -> str:
+        values = _written(scan, no_return, 0.0 if self._exact else _RESOLUTION).tolist()
+        return (
+            "".join(f"{value!r} " for value in values)
+            if self._exact
+            else ("%.4f " * len(values)) % tuple(values)
         )
 
     def _put(self, text: str) -> None:
@@ -136,18 +154,15 @@ class CarmenWriter:
         self._stream.write(text.encode("ascii"))
 
 
-def _written(scan: LaserScan, no_return: float) -> NDArray[np.float64]:
-    """Make the readings such that rounding to `_RESOLUTION` makes no return of none, nor none of a return."""
+def _written(scan: LaserScan, no_return: float, resolution: float) -> NDArray[np.float64]:
+    """Make the readings such that rounding to ``resolution`` makes no return of none, nor none of a return."""
     g = scan.geometry
     out = np.where(np.isfinite(scan.ranges), scan.ranges, no_return)
     out[(out > 0.0) & (out < g.range_min)] = 0.0
-    valid = scan.valid
-    out[valid] = np.clip(out[valid], _RESOLUTION, g.range_max - _RESOLUTION)
+    if resolution > 0.0:
+        valid = scan.valid
+        out[valid] = np.clip(out[valid], resolution, g.range_max - resolution)
     return out
-
-
-def _text(ranges: NDArray[np.float64]) -> str:
-    return ("%.4f " * len(ranges)) % tuple(ranges.tolist())
 
 
 def _placed(robot: Pose, laser: Pose) -> tuple[float, float, float]:
