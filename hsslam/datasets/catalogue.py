@@ -101,6 +101,10 @@ REAL = {
 """The real datasets by name."""
 
 
+SOURCE_OPTIONS = ("scan_topic", "odom_topic")
+"""What may follow the path of a log, after a question mark."""
+
+
 def names() -> list[str]:
     """Names of all datasets: the simulated ones, the real ones, those of plugins."""
     return [*SIMULATED, *REAL, *_plugins.names()]
@@ -181,13 +185,13 @@ def open_dataset(
     scans: int | None = None,
     on_error: OnError = "stop",
 ) -> Dataset:
-    """Open a dataset by name, or a CARMEN log by path.
+    """Open a dataset by name, or a log of any format by path.
 
     Parameters
     ----------
     name_or_path : str or path
         A name that `names` lists, or a file. A name wins over a file of the same name; ``./intel``
-        is the file.
+        is the file. Topics of a ROS bag may follow the path: ``drive.bag?scan_topic=/front&odom_topic=/odom``.
     data_dir : path, optional
         Where real datasets lie; see `data_directory`. Found there as ``intel/intel.clf`` or ``intel.clf``,
         plain or with ``.bz2`` or ``.gz`` at the end.
@@ -203,7 +207,8 @@ def open_dataset(
     DataError
         Not found: says where it looked, and what fetches it.
     """
-    from hsslam.datasets.file import FileDataset, log_stem
+    from hsslam.datasets.file import FileDataset
+    from hsslam.io.logs import LogOptions, log_stem
 
     name = str(name_or_path)
     if name in _plugins.names():
@@ -215,8 +220,10 @@ def open_dataset(
         return SimulatedDataset(name, seed=seed, scans=scans)
     if name in REAL:
         path = find_log(name, data_dir)
-        return FileDataset(path, info=REAL[name].info, scans=scans, on_error=on_error)
-    path = Path(name_or_path).expanduser()
+        return FileDataset(path, info=REAL[name].info, scans=scans, options=LogOptions(on_error))
+    location, told = split_source(name)
+    path = Path(location).expanduser()
+    options = LogOptions(on_error, **told)
     if not path.exists():
         raise DataError(
             f"{name}: no such file, and no dataset has this name{_suggest(name)}"
@@ -224,12 +231,52 @@ def open_dataset(
             else f"{name}: no such file"
         )
     stem = log_stem(path.name)
-    dataset = FileDataset(path, scans=scans, on_error=on_error)
+    dataset = FileDataset(path, scans=scans, options=options)
     if stem in REAL:
         # A copy of a public log under its own name still has to be attributed.
         info = replace(dataset.info, attribution=REAL[stem].info.attribution)
-        dataset = FileDataset(path, info=info, scans=scans, on_error=on_error)
+        dataset = FileDataset(path, info=info, scans=scans, options=options)
     return dataset
+
+
+def split_source(source: str) -> tuple[str, dict[str, str]]:
+    """Part the path of a log from the options that follow it after a question mark.
+
+    Raises
+    ------
+    DataError
+        An option that is none.
+    """
+    if Path(source).expanduser().exists() or "?" not in source:
+        return source, {}
+    location, _, query = source.rpartition("?")
+    told = {}
+    for part in query.split("&"):
+        key, _, value = part.partition("=")
+        if key not in SOURCE_OPTIONS or not value:
+            raise DataError(
+                f"{source}: expected {' or '.join(f'{k}=...' for k in SOURCE_OPTIONS)}, found {part!r}"
+            )
+        told[key] = value
+    return location, told
+
+
+def join_source(source: str, **options: str | None) -> str:
+    """Put options behind the path of a log, over those that stand there; None leaves one as it is.
+
+    A path is made absolute, so that the source means the same from any folder. Raises what `split_source` does.
+    """
+    if source in names():
+        if any(options.values()):
+            raise DataError(
+                f"dataset {source!r} has no topics: {', '.join(k for k, v in options.items() if v)}"
+            )
+        return source
+    location, told = split_source(source)
+    told |= {key: value for key, value in options.items() if value is not None}
+    path = Path(location).expanduser()
+    place = str(path.resolve()) if path.exists() else location
+    return f"{place}?{'&'.join(f'{k}={v}' for k, v in told.items())}" if told else place
 
 
 def find_log(name: str, data_dir: Path | str | None = None) -> Path:
@@ -240,11 +287,11 @@ def find_log(name: str, data_dir: Path | str | None = None) -> Path:
     DataError
         It is not there: says where it looked, and what fetches it.
     """
-    from hsslam.datasets.file import LOGS, PACKED
+    from hsslam.io.logs import FORMATS, PACKED
 
     folder = data_directory(data_dir)
     for place in (folder / name, folder):
-        for suffix in LOGS:
+        for suffix in FORMATS["carmen"].suffixes:
             for packed in PACKED:
                 path = place / f"{name}{suffix}{packed}"
                 if path.is_file():
@@ -264,4 +311,4 @@ def fetch_command(name: str, data_dir: Path | str | None = None) -> str:
 def _suggest(name: str) -> str:
     close = difflib.get_close_matches(name, names(), n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ""
-    return f"{hint} (there are: {', '.join(names())}; or give the path of a CARMEN log)"
+    return f"{hint} (there are: {', '.join(names())}; or give the path of a log)"

@@ -10,22 +10,16 @@ import numpy as np
 
 from hsslam.datasets.dataset import DatasetInfo
 from hsslam.errors import DataError
-from hsslam.io.carmen import CarmenStatistics, OnError, read_carmen
-from hsslam.io.carmen_messages import Laser
+from hsslam.io.log_statistics import LogStatistics
+from hsslam.io.logs import LogOptions, detect, log_stem, new_statistics, read_log
 from hsslam.io.relations import Relations, read_relations
 from hsslam.io.tum import read_tum
 from hsslam.scan import LaserScan
 from hsslam.trajectory import Trajectory
 
-PACKED = ("", ".bz2", ".gz")
-"""What may follow the suffix of a log."""
-
-LOGS = (".clf", ".log")
-"""Suffixes of a CARMEN log."""
-
 
 class FileDataset:
-    """A CARMEN log and, where they lie beside it, its relations and its exact truth.
+    """A log of any format and, where they lie beside it, its relations and its exact truth.
 
     Beside ``office.clf.bz2`` these are ``office.relations`` (with ``office.relations.index.csv``, which names
     scans by number, where it is there) and ``office.truth.tum`` (a pose per scan). Nothing is kept in memory:
@@ -34,20 +28,18 @@ class FileDataset:
     Parameters
     ----------
     path : path
-        The log, plain, gzip or bzip2.
+        The log: a file, or the folder of a ROS 2 bag.
     info : DatasetInfo, optional
         What listings show; made from the file's name where left out.
     scans : int, optional
         Take only the first so many scans, and the truth of those.
-    on_error : {"stop", "skip"}
-        What a malformed line does.
-    laser : {"front", "rear"}
-        Whose scans.
+    options : LogOptions, optional
+        How it is read: what a malformed line does, which laser, which topics.
 
     Raises
     ------
     DataError
-        No such file, or ``scans`` below 1.
+        No such file, a folder that is no bag, or ``scans`` below 1.
     """
 
     def __init__(
@@ -56,25 +48,20 @@ class FileDataset:
         *,
         info: DatasetInfo | None = None,
         scans: int | None = None,
-        on_error: OnError = "stop",
-        laser: Laser = "front",
+        options: LogOptions | None = None,
     ) -> None:
         self.path = Path(path)
-        if not self.path.exists():
-            raise DataError(f"{self.path}: no such file")
-        if self.path.is_dir():
-            raise DataError(f"{self.path}: expected a log, found a folder; name the file in it")
+        title = detect(self.path).title
         if scans is not None and scans < 1:
             raise DataError(f"{self.path}: expected at least one scan to be asked for, found {scans}")
-        self.statistics = CarmenStatistics()
+        self.statistics: LogStatistics = new_statistics(self.path)
         """Of the newest call of `scans`."""
         self._limit = scans
-        self._on_error: OnError = on_error
-        self._laser: Laser = laser
+        self._options = options or LogOptions()
         self._count = info.scan_count if info is not None else None
         if scans is not None and self._count is not None:
             self._count = min(scans, self._count)
-        self._info = info or DatasetInfo(self.stem, "file", f"CARMEN log {self.path.name}")
+        self._info = info or DatasetInfo(self.stem, "file", f"{title} {self.path.name}")
 
     @property
     def stem(self) -> str:
@@ -88,9 +75,9 @@ class FileDataset:
         return DatasetInfo(i.name, i.kind, i.description, i.attribution, self._count)
 
     def scans(self) -> Iterator[LaserScan]:
-        """Read the scans in the log's order, as a stream; `read_carmen` says what is raised."""
-        self.statistics = statistics = CarmenStatistics()
-        stream = read_carmen(self.path, on_error=self._on_error, laser=self._laser, statistics=statistics)
+        """Read the scans in the log's order, as a stream; `hsslam.io.logs.read_log` says what is raised."""
+        self.statistics = statistics = new_statistics(self.path)
+        stream = read_log(self.path, self._options, statistics)
         count = 0
         for scan in islice(stream, self._limit):
             count += 1
@@ -127,21 +114,12 @@ class FileDataset:
         if not path.exists():
             return None
         index = path.with_name(f"{path.name}.index.csv")
-        if index.exists() and self._on_error == "stop":
+        if index.exists() and self._options.on_error == "stop":
             found = read_relations(path, index=index)
         else:
-            log = read_carmen(self.path, on_error=self._on_error, laser=self._laser)
+            log = read_log(self.path, self._options)
             found = read_relations(path, stamps=np.array([scan.stamp for scan in log]))
         if self._limit is None:
             return found
         taken = np.maximum(found.first, found.second) < self._limit
         return Relations(found.first[taken], found.second[taken], found.poses[taken])
-
-
-def log_stem(name: str) -> str:
-    """Strip a log's file name of ``.clf`` or ``.log``, and of what packs it."""
-    for packed in PACKED[1:]:
-        name = name.removesuffix(packed)
-    for suffix in LOGS:
-        name = name.removesuffix(suffix)
-    return name
