@@ -6,7 +6,7 @@ A matcher is chosen by its name alone (``matcher: hide``) or with parameters
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
 from typing import Any, ClassVar, Literal, TypeVar
@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Literal, TypeVar
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_serializer, model_validator
 
+from hsslam import presets as preset_files
 from hsslam.errors import ConfigError
 from hsslam.matching import registry
 from hsslam.matching.interface import Matcher, MatcherConfig
@@ -192,12 +193,36 @@ class Config(Section):
     graph: GraphSection = GraphSection()
     map: MapSection = MapSection()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _presets(cls, data: Any) -> Any:
+        return expand(data) if isinstance(data, dict) and "preset" in data else data
+
+
+def expand(data: dict[str, Any]) -> dict[str, Any]:
+    """Settings with the presets that their key ``preset`` names laid under them, and without the key.
+
+    Raises
+    ------
+    ConfigError
+        No preset has the name.
+    """
+    named = data.get("preset") or ()
+    names = [named] if isinstance(named, str) else named
+    if not (isinstance(names, list | tuple) and all(isinstance(name, str) for name in names)):
+        raise ConfigError(f"preset: expected a name or a list of names, found {named!r}")
+    under: dict[str, Any] = {}
+    for name in names:
+        under = merge(under, preset_files.settings(name))
+    return merge(under, {key: value for key, value in data.items() if key != "preset"})
+
 
 def load_config(
     path: Path | str | None = None,
     overrides: Iterable[str] = (),
     base: Mapping[str, Any] | None = None,
     chosen: Mapping[str, Any] | None = None,
+    presets: Sequence[str] = (),
 ) -> Config:
     """Read a config.
 
@@ -211,13 +236,19 @@ def load_config(
         Settings under the file's.
     chosen : mapping, optional
         Settings over the file's and under the overrides, e.g. a matcher chosen on the command line.
+    presets : sequence of str
+        Names of presets, in place of those that the file's key ``preset`` names. Presets are over ``base`` and
+        under the file's other settings; a later one is over an earlier one.
 
     Raises
     ------
     ConfigError
         One line: the file, the key, what was expected and what was found; unknown keys with a suggestion.
     """
-    data = merge(deepcopy(dict(base or {})), read_yaml(path) if path is not None else {})
+    told = read_yaml(path) if path is not None else {}
+    if presets:
+        told["preset"] = list(presets)
+    data = merge(deepcopy(dict(base or {})), expand(told))
     data = merge(data, deepcopy(dict(chosen or {})))
     for override in overrides:
         apply_override(data, override)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from hsslam.cli import console
-from hsslam.cli.options import ConfigFile, MatcherName, Seed, Settings
+from hsslam.cli.options import AsJson, ConfigFile, MatcherName, Presets, Seed, Settings
 from hsslam.cli.settings import resolve
 
 app: typer.Typer = typer.Typer(
@@ -18,6 +18,7 @@ app: typer.Typer = typer.Typer(
 
 @app.command()
 def show(
+    preset: Presets = None,
     config: ConfigFile = None,
     matcher: MatcherName = None,
     loop_matcher: Annotated[
@@ -30,7 +31,12 @@ def show(
     from hsslam.config import dump
 
     resolved = resolve(
-        file=config, matcher=matcher, loop_matcher=loop_matcher, seed=seed, settings=settings or ()
+        file=config,
+        matcher=matcher,
+        loop_matcher=loop_matcher,
+        seed=seed,
+        presets=preset or (),
+        settings=settings or (),
     )
     console.say(dump(resolved).rstrip())
 
@@ -43,6 +49,30 @@ def validate(file: Annotated[Path, typer.Argument(metavar="FILE", help="YAML set
 
 
 @app.command()
+def presets(
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="Print this one, reasons and all.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """List the presets for sensors and places, or print one: what it overrides and why."""
+    from hsslam import presets as files
+
+    if name is not None:
+        preset = files.load(name)
+        if as_json:
+            console.print_json({"name": name, "kind": preset.kind, "settings": files.settings(name)})
+            return
+        console.say(preset.text.rstrip())
+        return
+    found = [files.load(each) for each in files.names()]
+    if as_json:
+        console.print_json([{"name": p.name, "kind": p.kind, "what": p.summary} for p in found])
+        return
+    console.table(("name", "of a", "what"), [(p.name, p.kind, p.summary) for p in found])
+
+
+@app.command()
 def schema() -> None:
     """Print the JSON schema of the settings, for editors; every matcher's parameters are in it."""
     console.print_json(config_schema())
@@ -50,6 +80,7 @@ def schema() -> None:
 
 def config_schema() -> dict[str, Any]:
     """The JSON schema of `hsslam.config.Config`, with each installed matcher's parameters spelled out."""
+    from hsslam import presets
     from hsslam.config import Config
     from hsslam.errors import MatcherUnavailableError
     from hsslam.matching import registry
@@ -67,5 +98,11 @@ def config_schema() -> dict[str, Any]:
         variant["properties"] = {"name": {"const": name}, **variant.get("properties", {})}
         variant["required"] = ["name", *variant.get("required", [])]
         variants.append(variant)
+    known_presets = {"enum": presets.names()}
+    whole["properties"]["preset"] = {
+        "title": "Preset",
+        "description": "defaults for a sensor or a place, under the other settings",
+        "anyOf": [known_presets, {"type": "array", "items": known_presets}],
+    }
     whole["$defs"]["MatcherSection"] = {"title": "Matcher", "anyOf": variants}
     return whole

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from hsslam.cli import console
-from hsslam.cli.options import AsJson, DataDir, Quiet, Scans, Seed
+from hsslam.cli.options import AsJson, DataDir, OdomTopic, Quiet, Scans, ScanTopic, Seed
 from hsslam.cli.progress import progress
 from hsslam.errors import DataError
 
@@ -50,15 +50,19 @@ def info(
     data_dir: DataDir = None,
     seed: Seed = None,
     scans: Scans = None,
+    scan_topic: ScanTopic = None,
+    odom_topic: OdomTopic = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Read a dataset through and say what is in it: scans, beams, duration, truth."""
     import numpy as np
 
-    from hsslam.datasets.catalogue import open_dataset
+    from hsslam.datasets.catalogue import join_source, open_dataset
+    from hsslam.datasets.file import FileDataset
 
-    log = open_dataset(name, data_dir=data_dir, seed=seed or 0, scans=scans)
+    source = join_source(name, scan_topic=scan_topic, odom_topic=odom_topic)
+    log = open_dataset(source, data_dir=data_dir, seed=seed or 0, scans=scans)
     beams: dict[int, int] = {}
     stamps: list[float] = []
     travelled = 0.0
@@ -75,6 +79,7 @@ def info(
     if not stamps:
         raise DataError(f"{name}: holds no scan")
     relations = log.relations()
+    notes = log.statistics.notes if isinstance(log, FileDataset) else []
     found = {
         **asdict(log.info),
         "scan_count": len(stamps),
@@ -83,6 +88,7 @@ def info(
         "odometry_m": travelled,
         "truth": log.truth() is not None,
         "relations": len(relations) if relations is not None else 0,
+        "notes": notes,
     }
     if as_json:
         console.print_json(found)
@@ -96,6 +102,7 @@ def info(
             ("beams", ", ".join(f"{count} ({scans:,} scans)" for count, scans in sorted(beams.items()))),
             ("duration", f"{found['duration_s']:,.0f} s"),
             ("travelled", f"{travelled:,.0f} m by odometry"),
+            *(("log", note) for note in notes),
             ("truth", "exact poses" if found["truth"] else f"{found['relations']:,} relations"),
             *([("attribution", log.info.attribution)] if log.info.attribution else []),
         ]

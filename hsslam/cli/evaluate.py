@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hsslam.cli import accuracy, console
-from hsslam.cli.options import AsJson, DataDir, Quiet, Scans, Seed
+from hsslam.cli.options import AsJson, DataDir, OdomTopic, Quiet, Scans, ScanTopic, Seed
 from hsslam.cli.progress import Progress, progress
 from hsslam.errors import DataError
 
@@ -31,6 +31,8 @@ def evaluate(
     seed: Seed = None,
     scans: Scans = None,
     data_dir: DataDir = None,
+    scan_topic: ScanTopic = None,
+    odom_topic: OdomTopic = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -38,7 +40,7 @@ def evaluate(
 
     Relations error where the log has relations; ATE and RPE where its exact poses are known.
     """
-    from hsslam.datasets.catalogue import open_dataset
+    from hsslam.datasets.catalogue import join_source, open_dataset
     from hsslam.io.relations import read_relations
     from hsslam.io.trajectory_csv import read_trajectory_csv
     from hsslam.io.tum import read_tum
@@ -46,7 +48,8 @@ def evaluate(
 
     read = read_trajectory_csv if trajectory.suffix == ".csv" else read_tum
     found = read(trajectory)
-    log = open_dataset(dataset, data_dir=data_dir, seed=seed or 0, scans=scans)
+    source = join_source(dataset, scan_topic=scan_topic, odom_topic=odom_topic)
+    log = open_dataset(source, data_dir=data_dir, seed=seed or 0, scans=scans)
     with progress(quiet or as_json) as shown:
         shown.stage(f"reading {log.info.name}", log.info.scan_count or scans, "scans")
         odometry = _odometry(log, shown)

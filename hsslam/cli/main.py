@@ -11,9 +11,11 @@ from hsslam.cli import (
     compare,
     config,
     console,
+    convert,
     datasets,
     doctor,
     evaluate,
+    init,
     interrupt,
     match,
     matchers,
@@ -64,10 +66,12 @@ def hsslam(
     """2D laser scan matchers competing on equal terms and feeding one pose graph."""
 
 
+app.command("init")(init.init)
 app.command("run")(run.run)
 app.command("compare", cls=compare.ManyMatchers)(compare.compare)
 app.command("match")(match.match)
 app.command("eval")(evaluate.evaluate)
+app.command("convert")(convert.convert)
 app.command("reproduce")(reproduce.reproduce)
 app.command("doctor")(doctor.doctor)
 app.add_typer(matchers.app, name="matchers")

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hsslam.cli import console
-from hsslam.cli.options import AsJson, DataDir, MatcherName, Plugin, Quiet, Seed, Settings
+from hsslam.cli.options import (
+    AsJson,
+    DataDir,
+    MatcherName,
+    OdomTopic,
+    Plugin,
+    Quiet,
+    ScanTopic,
+    Seed,
+    Settings,
+)
 from hsslam.cli.progress import progress
 from hsslam.errors import ConfigError, DataError
 
@@ -43,6 +53,8 @@ def match(
     settings: Settings = None,
     seed: Seed = None,
     data_dir: DataDir = None,
+    scan_topic: ScanTopic = None,
+    odom_topic: OdomTopic = None,
     picture: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="The picture; match.png (or match-2.png...) if left out."),
@@ -68,6 +80,10 @@ def match(
         raise ConfigError(f"--window: expected three positive numbers, found {window!r}")
     config = resolve(matcher=matcher, seed=seed, settings=settings or ())
     method = config.matcher.create()
+    if scan_topic or odom_topic:
+        from hsslam.datasets.catalogue import join_source
+
+        what = [join_source(what[0], scan_topic=scan_topic, odom_topic=odom_topic), *what[1:]]
     reference, points, odometry = _points(what, config.seed, data_dir)
     start = odometry
     if guess != "odometry":

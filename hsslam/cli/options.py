@@ -50,6 +50,26 @@ OnError: TypeAlias = Annotated[
         help="A malformed line of the log stops the run (if left out), or is skipped and counted.",
     ),
 ]
+ScanTopic: TypeAlias = Annotated[
+    str | None,
+    typer.Option("--scan-topic", metavar="TOPIC", help="Of LaserScan in a ROS bag; guessed if left out."),
+]
+OdomTopic: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--odom-topic",
+        metavar="TOPIC|tf|none",
+        help="Of Odometry in a ROS bag; tf: the transform from odom; guessed if left out.",
+    ),
+]
+Presets: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--preset",
+        metavar="NAME",
+        help="Defaults for a sensor or a place, e.g. rplidar-a2 or corridor; may be repeated.",
+    ),
+]
 
 
 def _use(context: typer.Context, files: list[Path] | None) -> list[Path] | None:

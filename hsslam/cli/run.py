@@ -12,10 +12,13 @@ from hsslam.cli.options import (
     ConfigFile,
     DataDir,
     MatcherName,
+    OdomTopic,
     OnError,
     Plugin,
+    Presets,
     Quiet,
     Scans,
+    ScanTopic,
     Seed,
     Settings,
     policy,
@@ -46,10 +49,13 @@ def run(
             autocompletion=complete.matchers,
         ),
     ] = None,
+    preset: Presets = None,
     config: ConfigFile = None,
     settings: Settings = None,
     seed: Seed = None,
     scans: Scans = None,
+    scan_topic: ScanTopic = None,
+    odom_topic: OdomTopic = None,
     data_dir: DataDir = None,
     out: Annotated[
         Path | None,
@@ -81,10 +87,12 @@ def run(
         matcher=matcher,
         loop_matcher=loop_matcher,
         seed=seed,
+        presets=preset or (),
         settings=settings or (),
         base=died.config if died is not None else None,
     )
-    header = Header(_source(dataset, scans, on_error, died), resolved.model_dump(mode="json"))
+    topics = {"scan_topic": scan_topic, "odom_topic": odom_topic}
+    header = Header(_source(dataset, topics, scans, on_error, died), resolved.model_dump(mode="json"))
     if died is not None:
         header.check_same(died, f"{resume}")
     log = open_dataset(
@@ -109,15 +117,18 @@ def run(
 
 
 def _source(
-    dataset: str | None, scans: int | None, on_error: str | None, died: Header | None
+    dataset: str | None,
+    topics: dict[str, str | None],
+    scans: int | None,
+    on_error: str | None,
+    died: Header | None,
 ) -> dict[str, Any]:
     """What opens the scans: told by the options; what they leave out, by the journal of the run that died."""
-    from hsslam.datasets.catalogue import names
+    from hsslam.datasets.catalogue import join_source
 
-    if dataset is None and died is None:
-        raise ConfigError("say what to run on: a name that `hsslam datasets` lists, or a log")
-    if dataset is not None and dataset not in names() and Path(dataset).is_file():
-        dataset = str(Path(dataset).resolve())
-    told = {"source": dataset, "scans": scans, "on_error": on_error}
     under = {"on_error": "stop", **(died.dataset if died is not None else {})}
+    dataset = dataset if dataset is not None else under.get("source")
+    if dataset is None:
+        raise ConfigError("say what to run on: a name that `hsslam datasets` lists, or a log")
+    told = {"source": join_source(dataset, **topics), "scans": scans, "on_error": on_error}
     return {**told, **{key: value for key, value in under.items() if told[key] is None}}

@@ -61,6 +61,7 @@ def summary(
         ("keyframes", f"{metrics['keyframes']:,}"),
         ("loops", f"{metrics['loops_accepted']:,} accepted of {metrics['loops_tried']:,} tried"),
         *([("skipped", f"{skipped:,} malformed lines")] if (skipped := metrics["skipped_lines"]) else []),
+        *(("log", note) for note in metrics["notes"]),
         *accuracy.rows(metrics),
         ("output", f"{folder.path}/"),
     ]
@@ -89,6 +90,7 @@ def _metrics(result: SlamResult, config: Config, log: Dataset) -> dict[str, Any]
         "scans": len(result.trajectory),
         "duration_s": float(np.ptp(stamps)) if len(stamps) else 0.0,
         "skipped_lines": log.statistics.skipped if isinstance(log, FileDataset) else 0,
+        "notes": log.statistics.notes if isinstance(log, FileDataset) else [],
         "matched": result.matched,
         "keyframes": len(result.keyframes),
         "loops_tried": len(result.loops),

@@ -16,6 +16,7 @@ def resolve(
     matcher: str | None = None,
     loop_matcher: str | None = None,
     seed: int | None = None,
+    presets: Sequence[str] = (),
     settings: Sequence[str] = (),
     base: Mapping[str, Any] | None = None,
 ) -> Config:
@@ -24,7 +25,7 @@ def resolve(
 
     options = {"matcher": matcher, "loop_matcher": loop_matcher, "seed": seed}
     chosen = {key: value for key, value in options.items() if value is not None}
-    return load_config(file, settings, base=base, chosen=chosen)
+    return load_config(file, settings, base=base, chosen=chosen, presets=split(presets))
 
 
 def split(names: Sequence[str]) -> list[str]:

@@ -223,7 +223,7 @@ def open_dataset(
         return FileDataset(path, info=REAL[name].info, scans=scans, options=LogOptions(on_error))
     location, told = split_source(name)
     path = Path(location).expanduser()
-    options = LogOptions(on_error, **told)
+    options = LogOptions(on_error, scan_topic=told.get("scan_topic"), odom_topic=told.get("odom_topic"))
     if not path.exists():
         raise DataError(
             f"{name}: no such file, and no dataset has this name{_suggest(name)}"

@@ -147,7 +147,7 @@ def write_range_npz(path: Path | str, scans: Iterable[LaserScan]) -> int:
         The laser changes from one scan to another; no scan; the folder cannot be written to.
     """
     path = Path(path)
-    kept = []
+    kept: list[LaserScan] = []
     for scan in scans:
         if kept:
             _require_same_laser(path, kept[0], scan)

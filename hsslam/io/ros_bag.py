@@ -87,7 +87,7 @@ class Bag:
                 f"{self.path}: several topics hold {_short(kind)}: {self._listed(kind)}; choose one with "
                 f"--{option.replace('_', '-')} TOPIC, or FILE?{option}=TOPIC where a dataset is named"
             )
-        return (usual or there or [None])[0]
+        return next(iter(usual or there), None)
 
     def messages(self, *topics: str) -> Iterator[Message | DecodeError]:
         """Messages of some topics as they were received; one that cannot be decoded comes as its error.
@@ -104,7 +104,7 @@ class Bag:
             for number, (connection, received, raw) in enumerate(self._reader.messages(chosen), start=1):
                 try:
                     content = self._reader.deserialize(raw, connection.msgtype)
-                except (*_damage(), AssertionError, UnicodeDecodeError) as error:
+                except _damage() as error:
                     yield DecodeError(
                         f"message {number} ({connection.topic}): cannot be decoded: {_told(error)}"
                     )
@@ -202,6 +202,7 @@ def _damage() -> tuple[type[Exception], ...]:
         IndexError,
         ValueError,
         RuntimeError,
+        AssertionError,
     )
 
 

@@ -36,8 +36,8 @@ class Slam:
 
     Parameters
     ----------
-    config : Config
-        Everything that decides what happens.
+    config : Config, optional
+        Everything that decides what happens; the defaults where left out.
     replay : Replay, optional
         Matches of an interrupted run of the same config on the same log; they are taken, not computed again.
 
@@ -47,7 +47,8 @@ class Slam:
         If a matcher cannot be made.
     """
 
-    def __init__(self, config: Config, replay: Replay | None = None) -> None:
+    def __init__(self, config: Config | None = None, replay: Replay | None = None) -> None:
+        config = config if config is not None else Config()
         self._config = config
         self._replay = replay if replay is not None else Replay()
         self._stopwatch = Stopwatch()
@@ -77,8 +78,23 @@ class Slam:
             yield from self.process(scan)
         yield from self.finish()
 
-    def process(self, scan: LaserScan) -> Iterator[Event]:
-        """Take the next scan; its pose comes first, then what follows from it."""
+    def solve(self, scans: Iterable[LaserScan]) -> SlamResult:
+        """Process every scan of a log, finish, and return what came of it; for those who need no events."""
+        for _ in self.run(scans):
+            pass
+        return self.result()
+
+    def process(self, scan: LaserScan) -> list[Event]:
+        """Take the next scan, of a log or a live source.
+
+        Returns
+        -------
+        list of Event
+            First a `Tracked` with the scan's pose, then what followed from it.
+        """
+        return list(self._process(scan))
+
+    def _process(self, scan: LaserScan) -> Iterator[Event]:
         if self._graph is None:
             self._graph = PoseGraph(self._config.graph, scan.odometry)
             self._tracker.start(scan, scan.robot_points)
