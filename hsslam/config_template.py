@@ -15,7 +15,7 @@ from hsslam.config import Config, MatcherSection, load_config
 
 _WIDTH = 100
 _HEAD = """\
-Settings of hsslam: every one there is, at its default. Delete what you do not change; a run fills it in.
+Settings of hsslam: every one there is, at its default. What you delete stays at its default.
 Use: hsslam run DATASET --config FILE.  Check: hsslam config validate FILE.
 """
 

@@ -70,22 +70,22 @@ def convert(
         raise DataError(f"{out}: is there already and is not overwritten; delete it or choose another name")
     path = Path(source).expanduser()
     if source not in names() and is_run_folder(path):
-        made = _from_run(path, out, _target(out, to, ("trajectory",)), data_dir)
+        made = _from_run(path, out, _target(out, to), data_dir)
     elif source not in names() and detect_trajectory(path) is not None:
-        target = _target(out, to, ("trajectory",))
+        target = _target(out, to)
         made = _write_trajectory(_stamped(path, stamps, seed or 0, data_dir), out, target, str(path))
     else:
         joined = join_source(source, scan_topic=scan_topic, odom_topic=odom_topic)
         log = open_dataset(joined, data_dir=data_dir, seed=seed or 0, scans=scans, on_error=policy(on_error))
         with progress(quiet) as shown:
-            made = _from_log(log, out, _target(out, to, ("log", "trajectory")), shown)
+            made = _from_log(log, out, _target(out, to, of_log=True), shown)
     if not quiet:
         for line in made:
             console.say(line)
 
 
-def _target(out: Path, to: str | None, kinds: tuple[str, ...]) -> str:
-    """The format asked for by the option, else by the suffix."""
+def _target(out: Path, to: str | None, *, of_log: bool = False) -> str:
+    """The format asked for by the option, else by the suffix, which may mean one thing of a log and another else."""
     from hsslam.io.logs import by_suffix
     from hsslam.io.trajectories import SUFFIXES
 
@@ -93,11 +93,11 @@ def _target(out: Path, to: str | None, kinds: tuple[str, ...]) -> str:
         if to not in _TARGETS:
             raise ConfigError(f"--to is one of {', '.join(_TARGETS)}, found {to!r}")
         return to
-    log = by_suffix(out.name) if "log" in kinds else None
-    if log is not None:
-        return log.name
     suffix = out.suffix.lower()
-    found = SUFFIXES.get(suffix) or _OF_RUN.get(suffix)
+    told = [SUFFIXES.get(suffix), _OF_RUN.get(suffix)]
+    if (log := by_suffix(out.name)) is not None:
+        told.insert(0 if of_log else len(told), log.name)
+    found = next((name for name in told if name), None)
     if found is None or found == "txt":
         raise ConfigError(f"{out}: the name does not tell the format; give --to: {', '.join(_TARGETS)}")
     return found

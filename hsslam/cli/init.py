@@ -33,4 +33,4 @@ def init(
     text = commented(config, split(preset or ()))
     with atomic_path(file) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    console.say(f"{file}: edit it, then: hsslam run office --config {file}")
+    console.say(f"{file}: edit it, then: hsslam run DATASET --config {file}")
