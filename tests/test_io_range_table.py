@@ -212,10 +212,11 @@ def test_bad_gfs_is_one_line(tmp_path: Path, text: str, said: str) -> None:
 def test_the_content_tells_the_format_where_it_can(tmp_path: Path) -> None:
     (tmp_path / "a.log").write_text(GFS)
     assert detect(tmp_path / "a.log").name == "gfs"
-    (tmp_path / "b.data").write_bytes(b"#ROSBAG V2.0\n")
-    assert detect(tmp_path / "b.data").name == "ros1"
+    (tmp_path / "b.bag").write_bytes(b"#ROSBAG V2.0\n")
+    assert detect(tmp_path / "b.bag").name == "ros1"
     (tmp_path / "c").write_bytes(b"\x89MCAP0\r\n")
-    assert detect(tmp_path / "c").name == "mcap"
+    with pytest.raises(DataError, match=r"c: holds a ROS 2 bag \(MCAP\); rename it to c\.mcap"):
+        detect(tmp_path / "c")
     (tmp_path / "d.bag").write_text("not a bag")
     with pytest.raises(DataError, match=r"d\.bag: expected a ROS 1 bag, as its name says, found b'not a ba'"):
         detect(tmp_path / "d.bag")

@@ -26,6 +26,8 @@ _OLD_TRANSFORMS = "tf/msg/tfMessage"
 _USUAL = {LASER_SCAN: ("/scan", "/base_scan"), ODOMETRY: ("/odom",)}
 _OPTION = {LASER_SCAN: "scan_topic", ODOMETRY: "odom_topic"}
 
+_MENDERS = {".bag": "rosbag reindex", ".mcap": "mcap recover"}
+
 INSTALL = "pip install 'hsslam[ros]'"
 
 
@@ -169,9 +171,9 @@ def _one_line(path: Path) -> Iterator[None]:
     try:
         yield
     except _damage() as error:
+        mend = _MENDERS.get(path.suffix, "ros2 bag reindex")
         raise DataError(
-            f"{path}: cannot be read as a ROS bag: {_told(error)}; if it was cut off, "
-            "`rosbag reindex` or `ros2 bag reindex` may mend it"
+            f"{path}: cannot be read as a ROS bag: {_told(error)}; if the recording was cut off, `{mend}` may mend it"
         ) from error
 
 
