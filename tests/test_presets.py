@@ -53,8 +53,10 @@ def test_presets_lie_under_the_file_and_over_the_base(tmp_path: Path) -> None:
     path = tmp_path / "c.yaml"
     path.write_text("preset: warehouse\nkeyframes: {distance: 0.3}\n")
     config = load_config(path)
-    assert (config.keyframes.distance, config.loops.radius, config.loops.window.half_x) == (0.3, 6.0, 2.0)
-    assert config.loops.window.half_theta_deg == Config().loops.window.half_theta_deg
+    assert (config.keyframes.distance, config.loops.radius) == (0.3, 6.0)
+    assert config.loops.window == Config().loops.window
+    window = load_config(presets=["corridor"]).tracker.window
+    assert window.half_theta_deg == Config().tracker.window.half_theta_deg
     assert load_config(path, base={"loops": {"radius": 1.0}}).loops.radius == 6.0
     assert load_config(path, ["loops.radius=4"]).loops.radius == 4.0
 
@@ -62,10 +64,10 @@ def test_presets_lie_under_the_file_and_over_the_base(tmp_path: Path) -> None:
 def test_a_later_preset_wins_and_an_option_stands_in_for_the_files(tmp_path: Path) -> None:
     path = tmp_path / "c.yaml"
     path.write_text("preset: [urg-04lx, warehouse]\n")
-    assert load_config(path).loops.radius == 6.0
-    path.write_text("preset: [warehouse, urg-04lx]\n")
-    assert load_config(path).loops.radius == 2.0
     assert load_config(path).keyframes.distance == 0.5
+    path.write_text("preset: [warehouse, urg-04lx]\n")
+    assert load_config(path).keyframes.distance == 0.2
+    assert load_config(path).loops.radius == 6.0
     assert load_config(path, presets=["office"]) == Config()
 
 
@@ -136,7 +138,7 @@ def test_init_writes_a_file_that_runs_use_and_never_overwrites(
 
 def test_config_show_and_presets() -> None:
     shown = hsslam("config", "show", "--preset", "warehouse", "--preset", "urg-04lx")
-    assert yaml.safe_load(shown.stdout)["loops"]["radius"] == 2.0
+    assert yaml.safe_load(shown.stdout)["keyframes"]["distance"] == 0.2
     listed = hsslam("config", "presets")
     assert all(name in listed.stdout for name in SENSORS + PLACES)
     assert [
@@ -152,4 +154,4 @@ def test_a_resumed_run_is_not_given_another_preset(tmp_path: Path) -> None:
     assert load_config(tmp_path / "r" / "config.yaml").tracker.window.half_x == 0.05
     assert hsslam("run", "--resume", tmp_path / "r", "--quiet").exit_code == 0
     other = hsslam("run", "--resume", tmp_path / "r", "--preset", "warehouse")
-    assert other.exit_code == 2 and "config.keyframes.distance was 0.2, now 0.5" in other.stderr
+    assert other.exit_code == 2 and "config.keyframes.distance was 0.3, now 0.5" in other.stderr
