@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hsslam.cli import console
+from hsslam.cli import complete, console
 from hsslam.cli.options import DataDir, OdomTopic, OnError, Quiet, Scans, ScanTopic, Seed, policy
 from hsslam.cli.progress import Progress, progress
 from hsslam.errors import ConfigError, DataError
@@ -33,7 +33,9 @@ def convert(
     source: Annotated[
         str,
         typer.Argument(
-            metavar="IN", help="A dataset's name, a log, a trajectory (TUM, KITTI, CSV), or a run folder."
+            metavar="IN",
+            help="A dataset's name, a log, a trajectory (TUM, KITTI, CSV), or a run folder.",
+            autocompletion=complete.datasets,
         ),
     ],
     out: Annotated[
