@@ -59,9 +59,20 @@ def examine(data_dir: Path | None = None) -> Iterator[Finding]:
     yield _kernel_cache()
     yield from _matchers()
     yield _plugin_files()
+    yield _bags()
     yield from _data(data_dir)
     yield _output()
     yield Finding("display", "ok", "not needed: pictures and reports are drawn without one")
+
+
+def _bags() -> Finding:
+    """Whether ROS bags can be read."""
+    from hsslam.io.ros_bag import INSTALL
+
+    try:
+        return Finding("ROS bags", "ok", f"read by rosbags {metadata.version('rosbags')}")
+    except metadata.PackageNotFoundError:
+        return Finding("ROS bags", "missing", "rosbags is not installed", INSTALL)
 
 
 def _python() -> Finding:
