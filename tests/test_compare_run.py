@@ -14,7 +14,7 @@ from hsslam.errors import ConfigError, DataError
 from hsslam.matching import create
 from hsslam.slam.folder import FILES
 from hsslam_eval.compare import CompareConfig, DatasetSpec, compare
-from hsslam_eval.comparison import Comparison, MatcherOutcome
+from hsslam_eval.comparison import Comparison, MatcherOutcome, Study
 from hsslam_eval.trials import make_pairs, run_trials
 
 MODULE = """
@@ -103,7 +103,7 @@ def test_the_working_matcher_has_its_full_row(done: tuple[Comparison, Path, Told
 
 def test_trials_are_those_of_the_library(done: tuple[Comparison, Path, Told]) -> None:
     steady = row(done[0], "steady")
-    settings = config("steady").trial_config
+    settings = config("steady").trials.model_copy(update={"seed": 5})
     expected = run_trials("steady", create("steady"), make_pairs(DATASET.open(), settings), settings)
     assert steady.trials is not None
     assert steady.trials.data.displacement_m == expected.displacement.tolist()
@@ -148,10 +148,13 @@ def test_progress_goes_to_the_end_of_each_part(done: tuple[Comparison, Path, Tol
 
 def test_json_round_trip(done: tuple[Comparison, Path, Told], tmp_path: Path) -> None:
     comparison, out, _ = done
-    again = Comparison.load(out)
+    again = Study.load(out)
     assert again.save(tmp_path).read_bytes() == (out / "comparison.json").read_bytes()
-    assert again.config == comparison.config
-    assert json.loads((out / "comparison.json").read_text())["command"] == "hsslam compare office"
+    assert again.comparisons[0].config == comparison.config
+    assert (
+        json.loads((out / "comparison.json").read_text())["comparisons"][0]["command"]
+        == "hsslam compare office"
+    )
 
 
 def test_what_is_complete_is_kept_and_what_failed_is_done_again(
@@ -169,7 +172,7 @@ def test_what_is_complete_is_kept_and_what_failed_is_done_again(
     assert {matcher for stage, matcher, *_ in told if stage == "trials"} == {"missing"}
     with pytest.raises(ConfigError, match=r"holds another comparison \(config\.seed was 5, now 6\)"):
         compare(settings.model_copy(update={"seed": 6}), DATASET, tmp_path)
-    with pytest.raises(ConfigError, match=r"dataset\.scans was 60, now 61"):
+    with pytest.raises(ConfigError, match=r"datasets\.0\.scans was 60, now 61"):
         compare(settings, DATASET.model_copy(update={"scans": 61}), tmp_path)
 
 

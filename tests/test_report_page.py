@@ -25,10 +25,12 @@ from hsslam_eval.comparison import (
     MatcherOutcome,
     MatcherTrials,
     SlamOutcome,
+    Study,
 )
 from hsslam_eval.outcomes import trials_record
 from hsslam_eval.report import write_report
-from hsslam_eval.tables import number, trial_tables, verdict
+from hsslam_eval.tables import number
+from hsslam_eval.trial_tables import trial_tables, verdict
 from hsslam_eval.trials import TrialConfig, TrialResult
 
 TRIALS = 60
@@ -92,12 +94,12 @@ def comparison(*matchers: MatcherOutcome, attribution: str = "") -> Comparison:
 def full() -> Comparison:
     rng = np.random.default_rng(3)
     return comparison(
-        MatcherOutcome("good", "good", {}, trials(rng, 1.0, 0.0), slam("good")),
-        MatcherOutcome("bad", "bad", {}, trials(rng, 4.0, 0.5), None, [Failure("slam", "it <broke> & fell")]),
+        MatcherOutcome("good", "good", {}, trials(rng, 1.0, 0.0), [slam("good")]),
+        MatcherOutcome("bad", "bad", {}, trials(rng, 4.0, 0.5), [], [Failure("slam", "it <broke> & fell")]),
         MatcherOutcome(
-            "gone", "gone", {}, None, None, [Failure("unavailable", "no module", "pip install it")]
+            "gone", "gone", {}, None, [], [Failure("unavailable", "no module", "pip install it")]
         ),
-        MatcherOutcome("raising", "raising", {}, trials(rng, 1.0, 1.0, raising=True), slam("raising")),
+        MatcherOutcome("raising", "raising", {}, trials(rng, 1.0, 1.0, raising=True), [slam("raising")]),
         attribution="Recorded by somebody, CC-BY 3.0",
     )
 
@@ -109,7 +111,7 @@ def folder(full: Comparison, tmp_path_factory: pytest.TempPathFactory) -> Path:
     odds[10:70, 10:190], odds[10, 10:190] = -2.0, 2.0
     (out / "runs" / "good").mkdir(parents=True)
     write_rosmap(out / "runs" / "good" / "map", OccupancyGrid(np.array([-10.0, -4.0]), 0.1, odds))
-    full.save(out)
+    Study([full]).save(out)
     assert write_report(full, out) == out / "report.html"
     return out
 
@@ -126,7 +128,7 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append((tag, dict(attrs)))
-        if tag not in {"meta", "img", "br"}:
+        if tag not in {"meta", "img", "br", "link"}:
             self.open.append(tag)
 
     def handle_endtag(self, tag: str) -> None:
@@ -141,25 +143,25 @@ def test_the_page_loads_nothing(folder: Path) -> None:
     page = Page(source)
     assert page.open == []
     pictures = [attributes for tag, attributes in page.tags if tag == "img"]
-    # Four of the trials, two trajectories, one map.
-    assert len(pictures) == 7
+    # Seven of the trials, error against time of SLAM, two trajectories, one map.
+    assert len(pictures) == 11
+    starts = {"data:image/png;base64": b"\x89PNG", "data:image/svg+xml;base64": b"<?xml"}
     for attributes in pictures:
         kind, _, data = (attributes["src"] or "").partition(",")
-        assert kind == "data:image/png;base64"
-        assert base64.b64decode(data).startswith(b"\x89PNG")
+        assert base64.b64decode(data).startswith(starts[kind])
         assert attributes["alt"]
     loading = {"src", "srcset", "data", "poster", "action", "background"}
     for tag, attributes in page.tags:
-        assert tag not in {"script", "link", "iframe", "object", "embed"}
+        assert tag not in {"script", "iframe", "object", "embed"}
         assert all((value or "").startswith("data:") for name, value in attributes.items() if name in loading)
-        assert (attributes.get("href") or "#").startswith("#")
+        assert (attributes.get("href") or "#").startswith(("#", "data:"))
     assert "url(" not in source and "@import" not in source
 
 
 def test_every_link_in_the_page_leads_somewhere(folder: Path) -> None:
     page = Page((folder / "report.html").read_text(encoding="utf-8"))
     places = {attributes["id"] for _, attributes in page.tags if "id" in attributes}
-    links = {(attributes["href"] or "").removeprefix("#") for tag, attributes in page.tags if tag == "a"}
+    links = {(attributes["href"] or "").removeprefix("#") for tag, attributes in page.tags if tag == "a" and "download" not in attributes}
     assert links and links <= places
 
 
@@ -177,7 +179,7 @@ def test_failures_are_shown_and_escaped(folder: Path) -> None:
 def test_the_markdown_names_pictures_that_exist_and_has_whole_tables(folder: Path) -> None:
     text = (folder / "report.md").read_text(encoding="utf-8")
     named = re.findall(r"!\[[^\]]*\]\(([^)]*)\)", text)
-    assert len(named) == 7
+    assert len(named) == 11
     assert all((folder / name).is_file() for name in named)
     tables = [block.splitlines() for block in text.split("\n\n") if block.startswith("| matcher")]
     assert len(tables) == 5
@@ -186,7 +188,7 @@ def test_the_markdown_names_pictures_that_exist_and_has_whole_tables(folder: Pat
 
 
 def test_csv_says_what_the_json_says(folder: Path) -> None:
-    data = json.loads((folder / "comparison.json").read_text(encoding="utf-8"))
+    (data,) = json.loads((folder / "comparison.json").read_text(encoding="utf-8"))["comparisons"]
     by_label: dict[str, dict[str, Any]] = {matcher["label"]: matcher for matcher in data["matchers"]}
 
     def rows(name: str) -> list[dict[str, str]]:
@@ -216,7 +218,7 @@ def test_csv_says_what_the_json_says(folder: Path) -> None:
     runs = {line["matcher"]: line for line in rows("slam.csv")}
     assert (
         float(runs["good"]["ate_translation_rmse_m"])
-        == by_label["good"]["slam"]["accuracy"]["ate"]["translation_rmse_m"]
+        == by_label["good"]["runs"][0]["accuracy"]["ate"]["translation_rmse_m"]
     )
     assert float(runs["good"]["real_time_factor"]) == 50.0
     assert runs["bad"]["status"] == "it <broke> & fell" and runs["bad"]["scans"] == ""
@@ -232,7 +234,7 @@ def test_the_table_shows_the_interval_of_the_summary(full: Comparison) -> None:
 
 
 def test_relations_show_where_there_are_some(tmp_path: Path) -> None:
-    found = comparison(MatcherOutcome("one", "one", {}, None, slam("one", relations=True)))
+    found = comparison(MatcherOutcome("one", "one", {}, None, [slam("one", relations=True)]))
     write_report(found, tmp_path)
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "0.0213 ± 0.0101" in text
@@ -254,19 +256,20 @@ def test_same_comparison_same_bytes(full: Comparison, folder: Path, tmp_path: Pa
     assert (tmp_path / "report.html").read_bytes() == (folder / "report.html").read_bytes()
 
 
-def test_nobody_wins_where_intervals_overlap() -> None:
+def test_a_winner_is_named_only_where_the_tests_say_so() -> None:
     rng = np.random.default_rng(1)
     alike = trials(rng, 1.0, 0.1)
     said = verdict(comparison(MatcherOutcome("a", "a", {}, alike), MatcherOutcome("b", "b", {}, alike)))
-    assert said.count("intervals overlap") == 2
-    better = verdict(
-        comparison(
-            MatcherOutcome("a", "a", {}, trials(rng, 4.0, 0.6)),
-            MatcherOutcome("b", "b", {}, trials(rng, 1.0, 0.0)),
-        )
+    assert said.count("No matcher ") == 4
+    found = comparison(
+        MatcherOutcome("a", "a", {}, trials(rng, 4.0, 0.6)),
+        MatcherOutcome("b", "b", {}, trials(rng, 1.0, 0.0)),
     )
+    better = verdict(found)
     assert better.startswith("b succeeds more often")
-    assert "b has the smallest median displacement" in better
+    assert "b has smaller displacement errors" in better
+    success = next(table for table in trial_tables(found) if table.name == "success")
+    assert [[cell.best for cell in row.cells].count(True) for row in success.rows] == [0, 1]
     assert verdict(comparison(MatcherOutcome("a", "a", {}, alike))) == ""
 
 

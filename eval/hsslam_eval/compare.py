@@ -1,14 +1,14 @@
-"""Several matchers on one dataset: the same trials and the same SLAM settings for each, one after the other."""
+"""Several matchers on one dataset or more: the same trials and the same SLAM settings for each, one after the other."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from hsslam.environment import environment
-from hsslam.errors import DataError
 from hsslam_eval.compare_config import CompareConfig, Contestant, DatasetSpec
 from hsslam_eval.comparison import (
     Comparison,
@@ -17,27 +17,28 @@ from hsslam_eval.comparison import (
     MatcherOutcome,
     MatcherTrials,
     SlamOutcome,
-    read_record,
+    Study,
 )
-from hsslam_eval.supervise import supervise
+from hsslam_eval.jobs import RUN_FOLDER, Job, Kind, run_job
+from hsslam_eval.outcomes import pooled
 from hsslam_eval.workspace import Workspace
 
-__all__ = ["CompareConfig", "DatasetSpec", "Progress", "compare"]
+__all__ = ["CompareConfig", "DatasetSpec", "Progress", "compare", "compare_datasets", "jobs_of", "part_names"]
 
 
 class Progress(Protocol):
     """What `compare` tells while it runs."""
 
-    def __call__(self, stage: str, matcher: str, done: int, total: int) -> None:
+    def __call__(self, stage: str, part: str, done: int, total: int) -> None:
         """Take a step.
 
         Parameters
         ----------
         stage : str
             ``prepare`` (opening the dataset, loading, compiling), ``trials``, ``slam``, ``optimise``, ``map``,
-            and at the end of a matcher's part ``done`` or ``failed``.
-        matcher : str
-            Its label.
+            and at the end of a job ``done`` or ``failed``.
+        part : str
+            One of `part_names`: the matcher's label, with the dataset and the seed where there are several.
         done, total : int
             Trials or scans; ``total`` is 0 where it is not known.
         """
@@ -51,7 +52,19 @@ def compare(
     *,
     command: str = "",
 ) -> Comparison:
-    """Run trials and SLAM for each matcher, each part in a process of its own.
+    """Compare on one dataset; see `compare_datasets`."""
+    return compare_datasets(config, [dataset], out, progress, command=command).comparisons[0]
+
+
+def compare_datasets(
+    config: CompareConfig,
+    datasets: Sequence[DatasetSpec],
+    out: Path | str,
+    progress: Progress | None = None,
+    *,
+    command: str = "",
+) -> Study:
+    """Run trials and SLAM for each dataset, matcher and seed, each job in a process of its own.
 
     What is complete in ``out`` from an earlier call with the same settings is taken as it is; what failed or is
     missing is done. A matcher that is unavailable, raises, crashes or hangs (``config.limits``) costs its own row
@@ -61,8 +74,8 @@ def compare(
     ----------
     config : CompareConfig
         What to compare.
-    dataset : DatasetSpec
-        On what.
+    datasets : sequence of DatasetSpec
+        On what. A simulated dataset is drawn anew for each seed: its own seed grows with that of the run.
     out : path
         A new folder, or that of the same comparison.
     progress : Progress, optional
@@ -72,99 +85,128 @@ def compare(
 
     Returns
     -------
-    Comparison
+    Study
 
     Raises
     ------
     ConfigError
         A matcher or a setting is unknown, or ``out`` holds another comparison.
     DataError
-        The dataset cannot be opened, or ``out`` holds something else.
+        A dataset cannot be opened, or ``out`` holds something else.
     """
-    info = dataset.open().info
-    workspace = Workspace.prepare(Path(out), config, dataset)
+    infos = [dataset.open().info for dataset in datasets]
+    workspace = Workspace.prepare(Path(out), config, datasets)
     tell = progress if progress is not None else _silent
-    outcomes = [_matcher(workspace, contestant, tell) for contestant in config.contestants]
-    comparison = Comparison(
-        dataset=DatasetRecord(
-            info.name,
-            info.kind,
-            info.description,
-            info.attribution,
-            dataset.seed,
-            dataset.scans or info.scan_count,
-        ),
-        config=config.resolved(),
-        command=command,
-        created=datetime.now().astimezone().isoformat(timespec="seconds"),
-        environment=environment(),
-        matchers=outcomes,
+    now = datetime.now().astimezone().isoformat(timespec="seconds")
+    several = len(datasets) > 1
+    study = Study(
+        [
+            Comparison(
+                dataset=DatasetRecord(
+                    info.name,
+                    info.kind,
+                    info.description,
+                    info.attribution,
+                    dataset.seed,
+                    dataset.scans or info.scan_count,
+                ),
+                config=config.resolved(),
+                command=command,
+                created=now,
+                environment=environment(),
+                matchers=[
+                    _Row(workspace, dataset, contestant, several, tell).outcome()
+                    for contestant in config.contestants
+                ],
+            )
+            for dataset, info in zip(datasets, infos, strict=True)
+        ]
     )
-    comparison.save(workspace.out)
-    return comparison
+    study.save(workspace.out)
+    return study
 
 
-def _silent(stage: str, matcher: str, done: int, total: int) -> None:
+def jobs_of(config: CompareConfig, dataset: DatasetSpec, contestant: Contestant, kind: Kind) -> list[Job]:
+    """The jobs of one matcher on one dataset, one for each seed."""
+    return [
+        Job(
+            kind=kind,
+            dataset=dataset.model_copy(update={"seed": dataset.seed + step}),
+            matcher=contestant,
+            seed=config.seed + step,
+            trials=config.trials,
+            slam=config.slam,
+        )
+        for step in range(config.seeds)
+    ]
+
+
+def part_names(config: CompareConfig, datasets: Sequence[DatasetSpec]) -> list[str]:
+    """What `Progress` calls the parts of a comparison, in their order."""
+    return [
+        _part(config, dataset, contestant, seed, len(datasets) > 1)
+        for dataset in datasets
+        for contestant in config.contestants
+        for seed in range(config.seed, config.seed + config.seeds)
+    ]
+
+
+def _part(
+    config: CompareConfig, dataset: DatasetSpec, contestant: Contestant, seed: int, several: bool
+) -> str:
+    named = [dataset.stem] if several else []
+    named.append(contestant.label)
+    named += [f"seed {seed}"] if config.seeds > 1 else []
+    return ", ".join(named)
+
+
+def _silent(stage: str, part: str, done: int, total: int) -> None:
     pass
 
 
-def _matcher(workspace: Workspace, contestant: Contestant, tell: Progress) -> MatcherOutcome:
-    label, failures = contestant.label, []
-    trials: MatcherTrials | None = None
-    slam: SlamOutcome | None = None
-    if workspace.config.run_trials:
-        done = _Part(workspace, label, "trials").complete(MatcherTrials, tell)
-        trials = done if isinstance(done, MatcherTrials) else None
-        failures += [done] if isinstance(done, Failure) else []
-    unavailable = any(failure.stage == "unavailable" for failure in failures)
-    if workspace.config.run_slam and not unavailable:
-        done = _Part(workspace, label, "slam").complete(SlamOutcome, tell)
-        slam = done if isinstance(done, SlamOutcome) else None
-        failures += [done] if isinstance(done, Failure) else []
-    return MatcherOutcome(label, contestant.name, contestant.parameters, trials, slam, failures)
-
-
 @dataclass(frozen=True)
-class _Part:
-    """One matcher's trials or SLAM run."""
+class _Row:
+    """One matcher on one dataset."""
 
     workspace: Workspace
-    label: str
-    stage: str
+    dataset: DatasetSpec
+    contestant: Contestant
+    several: bool
+    tell: Progress
 
-    def complete(self, kind: type[Any], tell: Progress) -> Any:
-        """Its record, from the folder or by doing it; or the `Failure`."""
-        path = self.workspace.record(self.label, self.stage)
-        failure: Failure | None = None
-        if not path.is_file():
-            failure = self._run(tell)
-        if failure is None:
-            try:
-                record = read_record(path, kind)
-            except DataError as error:
-                failure = Failure(self.stage, str(error), f"rm {path}")
-        tell("failed" if failure is not None else "done", self.label, 0, 0)
-        return record if failure is None else failure
+    def outcome(self) -> MatcherOutcome:
+        config, failures = self.workspace.config, list[Failure]()
+        trials, runs = list[MatcherTrials](), list[SlamOutcome]()
+        kinds: list[Kind] = []
+        if config.run_trials:
+            kinds.append("trials")
+        if config.run_slam:
+            kinds.append("slam")
+        for job in (job for kind in kinds for job in jobs_of(config, self.dataset, self.contestant, kind)):
+            done = self._run(job)
+            match done:
+                case MatcherTrials():
+                    trials.append(done)
+                case SlamOutcome():
+                    folder = self.workspace.folder(job) / RUN_FOLDER
+                    runs.append(replace(done, folder=folder.relative_to(self.workspace.out).as_posix()))
+                case Failure():
+                    failures.append(done)
+                    if done.stage == "unavailable":
+                        break
+        whole = None
+        if trials:
+            whole = pooled(trials, config.trials.model_copy(update={"seed": config.seed}))
+        label, name = self.contestant.label, self.contestant.name
+        return MatcherOutcome(label, name, self.contestant.parameters, whole, runs, failures)
 
-    def _run(self, tell: Progress) -> Failure | None:
-        failure: Failure | None = None
-        last = ("prepare", 0, 0)
-
-        def listen(message: dict[str, Any]) -> None:
-            nonlocal failure, last
-            if "failure" in message:
-                failure = Failure(**message["failure"])
-            elif "stage" in message:
-                last = (message["stage"], message["done"], message["total"])
-            stage, done, total = last
-            tell(stage, self.label, done, total)
-
-        workspace = self.workspace
-        log = workspace.log(self.label, self.stage)
-        arguments = [str(workspace.out), self.label, self.stage]
-        reason = supervise("hsslam_eval.worker", arguments, log, workspace.config.limits, listen)
-        if workspace.record(self.label, self.stage).is_file():
-            return None  # complete, whatever the process did afterwards
-        if failure is not None:
-            return failure
-        return Failure(self.stage, reason or "its process ended of its own accord and left no result")
+    def _run(self, job: Job) -> MatcherTrials | SlamOutcome | Failure:
+        part = _part(self.workspace.config, self.dataset, self.contestant, job.seed, self.several)
+        done = run_job(
+            job,
+            self.workspace.folder(job),
+            self.workspace.config.limits,
+            lambda stage, done, total: self.tell(stage, part, done, total),
+        )
+        self.tell("failed" if isinstance(done, Failure) else "done", part, 0, 0)
+        return done

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import glob
+import hashlib
+import re
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_serializer, model_validator
 
-from hsslam.config import Config, MatcherSection, Section
+from hsslam.config import Config, Section
 from hsslam.datasets.dataset import Dataset
-from hsslam.errors import MatcherUnavailableError
+from hsslam.errors import DataError, MatcherUnavailableError
 from hsslam.matching import registry
 from hsslam_eval.trial_config import TrialConfig
 
@@ -73,6 +76,9 @@ class CompareConfig(Section):
     seed: int = Field(
         default=0, ge=0, description="of trials and SLAM alike: every random choice follows from it"
     )
+    seeds: int = Field(
+        default=1, ge=1, description="how often everything is run: with seed, seed + 1, ..."
+    )
     run_trials: bool = Field(default=True, description="whether to run trials")
     run_slam: bool = Field(default=True, description="whether to run SLAM")
     trials: TrialConfig = Field(default_factory=TrialConfig, description="the same trials for every matcher")
@@ -123,22 +129,6 @@ class CompareConfig(Section):
             out.append(contestant.model_copy(update={"label": label}))
         return out
 
-    @property
-    def trial_config(self) -> TrialConfig:
-        """The trials' settings with the comparison's seed."""
-        return self.trials.model_copy(update={"seed": self.seed})
-
-    def slam_config(self, contestant: Contestant) -> Config:
-        """The settings of one matcher's SLAM run.
-
-        Raises
-        ------
-        ConfigError, MatcherUnavailableError
-            The matcher cannot be configured.
-        """
-        matcher = MatcherSection.model_validate({"name": contestant.name, **contestant.parameters})
-        return self.slam.model_copy(update={"seed": self.seed, "matcher": matcher})
-
     def resolved(self) -> dict[str, Any]:
         """Every setting as plain data; what has its place elsewhere left out."""
         data = self.model_dump(mode="json")
@@ -162,6 +152,34 @@ class DatasetSpec(Section):
     on_error: Literal["stop", "skip"] = Field(
         default="stop", description="what a malformed line of a log does"
     )
+
+    @property
+    def stem(self) -> str:
+        """What files made from it are called."""
+        stem = Path(self.name).name.partition(".")[0]
+        return re.sub(r"[^0-9A-Za-z_+-]", "_", stem) or "log"
+
+    def fingerprint(self) -> str:
+        """What tells its data from others': a built-in dataset's name, or the sha256 of a log and its relations.
+
+        Raises
+        ------
+        DataError
+            The log cannot be read.
+        """
+        from hsslam.datasets.catalogue import names
+
+        if self.name in names():
+            return self.name
+        path = Path(self.name)
+        digest = hashlib.sha256()
+        beside = sorted(path.parent.glob(f"{glob.escape(path.name.partition('.')[0])}.relations*"))
+        try:
+            for file in (path, *beside):
+                digest.update(file.read_bytes())
+        except OSError as error:
+            raise DataError(f"{file}: cannot be read: {error.strerror}") from error
+        return digest.hexdigest()
 
     def open(self) -> Dataset:
         """Open it; raises what `open_dataset` raises."""

@@ -9,17 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias, TypeVar
+from typing import Annotated, Any, TypeAlias
 
-from pydantic import BeforeValidator, TypeAdapter, ValidationError
+from pydantic import BeforeValidator
 
-from hsslam.errors import DataError
-from hsslam.io.atomic import atomic_path
+from hsslam_eval.record_files import read_record, write_record
 from hsslam_eval.statistics import Interval
 
 COMPARISON_FILE = "comparison.json"
-
-_Record = TypeVar("_Record")
 
 
 def _nan_for_none(value: Any) -> Any:
@@ -68,6 +65,10 @@ class TrialData:
         The framework's score of the match.
     failure : list of str
         Why there was no answer; empty where there was one.
+    initial_displacement_m, initial_rotation_deg : list of float
+        Error of the guess.
+    seed : list of int
+        Of the job that the trial belongs to.
     """
 
     displacement_m: list[Number]
@@ -76,6 +77,9 @@ class TrialData:
     evaluations: list[int]
     score: list[Number]
     failure: list[str]
+    initial_displacement_m: list[Number]
+    initial_rotation_deg: list[Number]
+    seed: list[int]
 
 
 @dataclass(frozen=True)
@@ -162,14 +166,25 @@ class Accuracy:
 
 
 @dataclass(frozen=True)
+class Loop:
+    """A loop candidate for plotting: between two places of the robot's way, accepted or not."""
+
+    first: tuple[float, float]
+    second: tuple[float, float]
+    accepted: bool
+
+
+@dataclass(frozen=True)
 class SlamOutcome:
-    """One matcher's SLAM run.
+    """One SLAM run, or a trajectory that something else made; what is not known of that is None or NaN.
 
     Parameters
     ----------
     folder : str
-        The run folder, relative to the comparison's.
-    scans, matched, keyframes, loops_tried, loops_accepted : int
+        The run folder, relative to the comparison's; empty where there is none.
+    scans : int
+        Poses of the trajectory.
+    matched, keyframes, loops_tried, loops_accepted : int or None
         Counts; ``matched`` scans owe their pose to a match, the others to odometry.
     wall_seconds, cpu_seconds : float
         From the first scan asked for to the last pose, compiling excluded.
@@ -189,14 +204,18 @@ class SlamOutcome:
         ``truth`` or ``odometry``.
     note : str
         Why the run folder has no map; empty where it has one.
+    seed : int or None
+        Of the run.
+    loops : list of Loop
+        Every candidate tried, in the frame of ``path``.
     """
 
     folder: str
     scans: int
-    matched: int
-    keyframes: int
-    loops_tried: int
-    loops_accepted: int
+    matched: int | None
+    keyframes: int | None
+    loops_tried: int | None
+    loops_accepted: int | None
     wall_seconds: Number
     cpu_seconds: Number
     warm_up_seconds: Number
@@ -209,6 +228,8 @@ class SlamOutcome:
     reference_path: list[tuple[float, float]]
     reference_kind: str
     note: str = ""
+    seed: int | None = None
+    loops: list[Loop] = field(default_factory=list)
 
     @property
     def real_time_factor(self) -> float:
@@ -218,7 +239,7 @@ class SlamOutcome:
     @property
     def matched_share(self) -> float:
         """Share of the scans whose pose came from a match."""
-        return self.matched / self.scans if self.scans else math.nan
+        return self.matched / self.scans if self.scans and self.matched is not None else math.nan
 
 
 @dataclass(frozen=True)
@@ -233,11 +254,14 @@ class Failure:
         One line.
     remedy : str
         The line to type that mends it, where one is known.
+    seed : int or None
+        Of the job that failed.
     """
 
     stage: str
     reason: str
     remedy: str = ""
+    seed: int | None = None
 
 
 @dataclass(frozen=True)
@@ -252,8 +276,10 @@ class MatcherOutcome:
         The matcher's registered name.
     parameters : dict
         Resolved; as given where the matcher is unavailable.
-    trials, slam : optional
-        What it did; None where it was not asked to, or failed.
+    trials : optional
+        Its trials, those of all seeds; None where it was not asked to run any, or all of them failed.
+    runs : list of SlamOutcome
+        Its SLAM runs, one for each seed that did not fail.
     failures : list of Failure
         What went wrong.
     """
@@ -262,8 +288,13 @@ class MatcherOutcome:
     name: str
     parameters: dict[str, Any]
     trials: MatcherTrials | None = None
-    slam: SlamOutcome | None = None
+    runs: list[SlamOutcome] = field(default_factory=list)
     failures: list[Failure] = field(default_factory=list)
+
+    @property
+    def slam(self) -> SlamOutcome | None:
+        """The first of its SLAM runs."""
+        return self.runs[0] if self.runs else None
 
 
 @dataclass(frozen=True)
@@ -280,7 +311,7 @@ class DatasetRecord:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Everything a report is made from.
+    """Several matchers on one dataset.
 
     Parameters
     ----------
@@ -310,6 +341,19 @@ class Comparison:
         """Matchers with something missing."""
         return [matcher for matcher in self.matchers if matcher.failures]
 
+
+@dataclass(frozen=True)
+class Study:
+    """The same comparison on one dataset or several: everything a report is made from.
+
+    Parameters
+    ----------
+    comparisons : list of Comparison
+        One for each dataset.
+    """
+
+    comparisons: list[Comparison]
+
     def save(self, folder: Path) -> Path:
         """Write ``comparison.json``; it appears when it is complete."""
         path = folder / COMPARISON_FILE
@@ -317,8 +361,8 @@ class Comparison:
         return path
 
     @staticmethod
-    def load(path: Path | str) -> Comparison:
-        """Read a comparison from its folder or its file.
+    def load(path: Path | str) -> Study:
+        """Read a study from its folder or its file.
 
         Raises
         ------
@@ -326,30 +370,4 @@ class Comparison:
             There is none, or it was written by something else.
         """
         path = Path(path)
-        return read_record(path / COMPARISON_FILE if path.is_dir() else path, Comparison)
-
-
-def write_record(path: Path, record: object) -> None:
-    """Write one of this module's dataclasses as JSON; it appears when it is complete."""
-    kind: type[Any] = type(record)
-    text = TypeAdapter(kind).dump_json(record, indent=1)
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(text + b"\n")
-
-
-def read_record(path: Path, kind: type[_Record]) -> _Record:
-    """Read what `write_record` wrote.
-
-    Raises
-    ------
-    DataError
-        The file is not there, or holds something else.
-    """
-    try:
-        return TypeAdapter(kind).validate_json(path.read_bytes())
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise DataError(f"{path}: is no {kind.__name__}: {where or 'content'}: {first['msg']}") from error
+        return read_record(path / COMPARISON_FILE if path.is_dir() else path, Study)

@@ -9,31 +9,36 @@ from pathlib import Path
 from typing import Any
 
 from hsslam.io.atomic import atomic_path
-from hsslam_eval.comparison import Accuracy, Comparison, MatcherTrials, Measured, SlamOutcome, Spread
+from hsslam_eval.comparison import Accuracy, MatcherTrials, Measured, SlamOutcome, Spread, Study
 
 
-def write_csv_files(comparison: Comparison, folder: Path) -> list[Path]:
+def write_csv_files(study: Study, folder: Path) -> list[Path]:
     """Write ``trials.csv``, ``trials_raw.csv`` and ``slam.csv``; a file without a row is not written.
 
-    A matcher that has no result has a row with its ``status`` and nothing else. Numbers are written with all
-    their digits; what does not exist is an empty cell.
+    A matcher that has no result has a row with its ``status`` and nothing else; ``slam.csv`` has a row for each run.
+    Numbers are written with all their digits; what does not exist is an empty cell.
     """
     trials: list[dict[str, Any]] = []
     raw: list[dict[str, Any]] = []
     slam: list[dict[str, Any]] = []
-    for matcher in comparison.matchers:
-        failures = {failure.stage: failure.reason for failure in matcher.failures}
-        gone = failures.get("unavailable")
-        if comparison.config.get("run_trials", True):
-            status = gone or failures.get("trials", "done")
-            row = _trials(matcher.trials) if matcher.trials is not None else {}
-            trials.append({"matcher": matcher.label, "status": status, **row})
-        if matcher.trials is not None:
-            raw += ({"matcher": matcher.label, **row} for row in _raw(matcher.trials))
-        if comparison.config.get("run_slam", True):
-            status = gone or failures.get("slam", "done")
-            row = _slam(matcher.slam) if matcher.slam is not None else {}
-            slam.append({"matcher": matcher.label, "status": status, **row})
+    for comparison in study.comparisons:
+        for matcher in comparison.matchers:
+            whose = {"dataset": comparison.dataset.name, "matcher": matcher.label}
+            failures = {failure.stage: failure.reason for failure in matcher.failures}
+            gone = failures.get("unavailable")
+            if comparison.config.get("run_trials", False):
+                status = gone or failures.get("trials", "done")
+                row = _trials(matcher.trials) if matcher.trials is not None else {}
+                trials.append({**whose, "status": status, **row})
+            if matcher.trials is not None:
+                raw += ({**whose, **row} for row in _raw(matcher.trials))
+            if comparison.config.get("run_slam", True):
+                slam += ({**whose, "status": "done", **_slam(run)} for run in matcher.runs)
+                slam += (
+                    {**whose, "status": failure.reason, "seed": failure.seed}
+                    for failure in matcher.failures
+                    if failure.stage in ("slam", "unavailable")
+                )
     files = {"trials.csv": trials, "trials_raw.csv": raw, "slam.csv": slam}
     return [_write(folder / name, rows) for name, rows in files.items() if rows]
 
@@ -62,7 +67,10 @@ def _raw(trials: MatcherTrials) -> Iterator[dict[str, Any]]:
     data = trials.data
     for trial in range(trials.count):
         yield {
+            "seed": data.seed[trial],
             "trial": trial,
+            "initial_displacement_m": data.initial_displacement_m[trial],
+            "initial_rotation_deg": data.initial_rotation_deg[trial],
             "displacement_m": data.displacement_m[trial],
             "rotation_deg": data.rotation_deg[trial],
             "seconds": data.seconds[trial],
@@ -74,6 +82,7 @@ def _raw(trials: MatcherTrials) -> Iterator[dict[str, Any]]:
 
 def _slam(slam: SlamOutcome) -> dict[str, Any]:
     return {
+        "seed": slam.seed,
         "scans": slam.scans,
         "matched": slam.matched,
         "keyframes": slam.keyframes,

@@ -1,32 +1,49 @@
-"""The report of a comparison: one self-contained HTML page and its Markdown and CSV twins."""
+"""The report of a comparison: one self-contained HTML page, its Markdown twin, and its tables and plots as files."""
 
 from __future__ import annotations
 
+import base64
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from hsslam.io.atomic import atomic_path
-from hsslam_eval.comparison import Comparison
+from hsslam_eval.comparison import Comparison, Study
 from hsslam_eval.csv_files import write_csv_files
-from hsslam_eval.figures import Picture, map_pictures, trajectory_pictures, trial_pictures
-from hsslam_eval.tables import slam_tables, trial_tables, verdict
+from hsslam_eval.figures import Picture, place_pictures, slam_pictures, trial_pictures
+from hsslam_eval.report_text import (
+    Problem,
+    contestants_table,
+    count,
+    equal_terms,
+    facts,
+    place_text,
+    problems,
+    sentence,
+    settings,
+    trial_text,
+)
+from hsslam_eval.slam_tables import slam_tables
+from hsslam_eval.table_files import to_csv, to_latex
+from hsslam_eval.tables import Table
+from hsslam_eval.trial_tables import trial_tables, verdict
 
 
-def write_report(comparison: Comparison, folder: Path | str) -> Path:
+def write_report(found: Study | Comparison, folder: Path | str) -> Path:
     """Write the report of a comparison into its folder.
 
-    Makes ``report.html`` (nothing in it is loaded from elsewhere), ``report.md`` with ``figures/*.png``,
-    ``trials.csv`` (a row per matcher), ``trials_raw.csv`` (a row per trial) and ``slam.csv``.
+    Makes ``report.html`` (nothing in it is loaded from elsewhere), ``report.md``, ``figures/`` (every plot as PNG, SVG
+    and PDF), ``tables/`` (every table as CSV and LaTeX), ``trials.csv`` (a row per matcher), ``trials_raw.csv`` (a row
+    per trial) and ``slam.csv`` (a row per run).
 
     Parameters
     ----------
-    comparison : Comparison
-        From `hsslam_eval.compare.compare`, or `Comparison.load`.
+    found : Study or Comparison
+        From `hsslam_eval.compare`, `Study.load`, or `hsslam_eval.existing_runs`.
     folder : path
         Where to; maps are taken from the run folders in it.
 
@@ -40,11 +57,130 @@ def write_report(comparison: Comparison, folder: Path | str) -> Path:
     OSError
         A file cannot be written.
     """
+    study = found if isinstance(found, Study) else Study([found])
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    content = _content(comparison, folder)
-    pictures = [*content["trial_figures"], *content["trajectory_figures"], *content["map_figures"]]
-    _write_pictures(pictures, folder / "figures")
+    parts = [_part(comparison, stem, folder) for comparison, stem in _stems(study)]
+    for part in parts:
+        for picture in part.pictures:
+            for kind, content in picture.files.items():
+                _write(folder / "figures" / f"{picture.key}.{kind}", content)
+        for item in part.tables:
+            _write(folder / "tables" / f"{item.key}.csv", item.csv.encode())
+            _write(folder / "tables" / f"{item.key}.tex", item.latex.encode())
+    shown = _content(study, parts)
+    templates = _templates()
+    for name in ("report.md", "report.html"):
+        _write(folder / name, templates.get_template(f"{name}.j2").render(shown).encode())
+    write_csv_files(study, folder)
+    return folder / "report.html"
+
+
+@dataclass(frozen=True)
+class TableFiles:
+    """A table with what it is called and its other forms."""
+
+    key: str
+    table: Table
+    csv: str
+    latex: str
+
+    @property
+    def links(self) -> list[tuple[str, str, str]]:
+        """Name, file name and data URL of each form that can be saved from the page."""
+        forms = (("CSV", "csv", "text/csv", self.csv), ("LaTeX", "tex", "text/x-tex", self.latex))
+        return [
+            (
+                name,
+                f"{self.key}.{suffix}",
+                f"data:{kind};charset=utf-8;base64,{base64.b64encode(text.encode()).decode('ascii')}",
+            )
+            for name, suffix, kind, text in forms
+        ]
+
+
+@dataclass(frozen=True)
+class Part:
+    """What a page shows of one dataset."""
+
+    id: str
+    name: str
+    description: str
+    problems: list[Problem]
+    verdict: str
+    trial_text: str
+    trial_tables: list[TableFiles]
+    trial_figures: list[Picture]
+    slam_tables: list[TableFiles]
+    slam_figures: list[Picture]
+    place_text: str
+    place_figures: list[Picture]
+
+    @property
+    def tables(self) -> list[TableFiles]:
+        """Every table."""
+        return [*self.trial_tables, *self.slam_tables]
+
+    @property
+    def pictures(self) -> list[Picture]:
+        """Every picture."""
+        return [*self.trial_figures, *self.slam_figures, *self.place_figures]
+
+
+def _stems(study: Study) -> Iterator[tuple[Comparison, str]]:
+    """Each comparison with what its files are called: the dataset's name, numbered where two share it."""
+    taken: dict[str, int] = {}
+    for comparison in study.comparisons:
+        stem = re.sub(r"[^0-9A-Za-z_+-]", "_", comparison.dataset.name) or "log"
+        taken[stem] = taken.get(stem, 0) + 1
+        yield comparison, stem if taken[stem] == 1 else f"{stem}-{taken[stem]}"
+
+
+def _part(comparison: Comparison, stem: str, folder: Path) -> Part:
+    def with_files(tables: Sequence[Table]) -> list[TableFiles]:
+        return [
+            TableFiles(f"{stem}-{table.name}", table, to_csv(table), to_latex(table, f"{stem}-{table.name}"))
+            for table in tables
+        ]
+
+    return Part(
+        id=stem,
+        name=comparison.dataset.name,
+        description=sentence(comparison.dataset.description),
+        problems=problems(comparison),
+        verdict=verdict(comparison),
+        trial_text=trial_text(comparison),
+        trial_tables=with_files(trial_tables(comparison)),
+        trial_figures=trial_pictures(comparison, stem),
+        slam_tables=with_files(slam_tables(comparison)),
+        slam_figures=slam_pictures(comparison, stem),
+        place_text=place_text(comparison),
+        place_figures=place_pictures(comparison, stem, folder),
+    )
+
+
+def _content(study: Study, parts: Sequence[Part]) -> dict[str, Any]:
+    first = study.comparisons[0]
+    version = str(first.environment.get("hsslam", ""))
+    labels = {matcher.label for comparison in study.comparisons for matcher in comparison.matchers}
+    names = " and ".join(part.name for part in parts)
+    return {
+        "version": version,
+        "title": f"{names}: {count(len(labels), 'matcher')} compared",
+        "subtitle": f"Made by hsslam {version}, {first.created.replace('T', ' ')}.",
+        "attributions": list(
+            dict.fromkeys(c.dataset.attribution for c in study.comparisons if c.dataset.attribution)
+        ),
+        "equal_terms": equal_terms(study),
+        "contestants": contestants_table(study),
+        "parts": parts,
+        "facts": facts(study),
+        "command": first.command,
+        "settings": settings(study),
+    }
+
+
+def _templates() -> Environment:
     templates = Environment(
         loader=PackageLoader("hsslam_eval"),
         autoescape=lambda name: name is not None and ".html" in name,
@@ -56,129 +192,9 @@ def write_report(comparison: Comparison, folder: Path | str) -> Path:
         r"\([^)]*\)", lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), text
     )
     templates.filters["cell"] = lambda text: str(text).replace("|", r"\|").replace("\n", " ")
-    for name in ("report.md", "report.html"):
-        text = templates.get_template(f"{name}.j2").render(content)
-        with atomic_path(folder / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-    write_csv_files(comparison, folder)
-    return folder / "report.html"
+    return templates
 
 
-@dataclass(frozen=True)
-class Problem:
-    """Something that is missing from the report, and why."""
-
-    label: str
-    what: str
-    reason: str
-    remedy: str
-
-
-def _content(comparison: Comparison, folder: Path) -> dict[str, Any]:
-    dataset, environment = comparison.dataset, comparison.environment
-    trials, slam = trial_tables(comparison), slam_tables(comparison)
-    maps = map_pictures(comparison, folder)
-    sections = [("trials", "Trials")] if trials else []
-    sections += [("slam", "SLAM"), ("trajectories", "Trajectories")] if slam else []
-    sections += [("maps", "Maps")] if maps else []
-    return {
-        "version": environment.get("hsslam", ""),
-        "title": f"{dataset.name}: {_count(len(comparison.matchers), 'matcher')} compared",
-        "subtitle": f"{_sentence(dataset.description)} Made by hsslam {environment.get('hsslam', '')}, "
-        f"{comparison.created.replace('T', ' ')}.",
-        "sections": [*sections, ("made", "How this was made")],
-        "problems": _problems(comparison),
-        "verdict": verdict(comparison),
-        "trial_text": _trial_text(comparison),
-        "trial_tables": trials,
-        "trial_figures": trial_pictures(comparison),
-        "slam_text": "The same settings for every matcher; it tracks every scan and, unless the settings name "
-        "another, closes the loops.",
-        "slam_tables": slam,
-        "trajectory_figures": trajectory_pictures(comparison),
-        "trajectory_text": _trajectory_text(comparison),
-        "map_figures": maps,
-        "map_text": "All at one scale. Black is occupied, white free, grey unknown.",
-        "facts": _facts(comparison),
-        "command": comparison.command,
-        "config": yaml.safe_dump(comparison.config, sort_keys=False).rstrip(),
-        "attribution": dataset.attribution,
-    }
-
-
-def _problems(comparison: Comparison) -> list[Problem]:
-    what = {"unavailable": "unavailable here", "trials": "trials failed", "slam": "SLAM failed"}
-    problems = []
-    for matcher in comparison.matchers:
-        for failure in matcher.failures:
-            problems.append(Problem(matcher.label, what[failure.stage], failure.reason, failure.remedy))
-        if matcher.slam is not None and matcher.slam.note:
-            problems.append(Problem(matcher.label, "no map", matcher.slam.note, ""))
-    return problems
-
-
-def _trial_text(comparison: Comparison) -> str:
-    done = next((matcher.trials for matcher in comparison.matchers if matcher.trials is not None), None)
-    if done is None:
-        return ""
-    settings = comparison.config["trials"]
-    first = done.successes[0]
-    return (
-        f"{done.count} trials, protocol {done.protocol} ({_PROTOCOLS.get(done.protocol, '')}). Each starts from the "
-        f"true pose plus an error uniform in ±{100.0 * settings['half_xy']:.3g} cm and "
-        f"±{settings['half_theta_deg']:.3g}°; pairs and errors are the same for every matcher. A success is nearer "
-        f"the truth than {100.0 * first.displacement_limit_m:.3g} cm and {first.rotation_limit_deg:.3g}°"
-        f"{'; the table has other definitions beside this one' if len(done.successes) > 1 else ''}."
-    )
-
-
-_PROTOCOLS = {
-    "simulated": "pairs of simulated scans; truth is exact",
-    "relations": "the two scans of a manually verified relation; truth is good to about 1 cm",
-    "static": "two scans between which odometry did not move; truth is zero",
-    "split": "even against odd beams of one scan; truth is zero",
-    "consecutive": "scans a few steps apart with the relative pose of a given trajectory; truth has its noise",
-}
-
-
-def _trajectory_text(comparison: Comparison) -> str:
-    kinds = {matcher.slam.reference_kind for matcher in comparison.matchers if matcher.slam is not None}
-    if kinds == {"truth"}:
-        return "Aligned with the true trajectory (least squares). All at one scale."
-    return (
-        "The log has no exact truth: odometry alone is shown for comparison, not as truth. All at one scale."
-    )
-
-
-def _facts(comparison: Comparison) -> list[tuple[str, str]]:
-    dataset, environment = comparison.dataset, comparison.environment
-    kind = {"simulated": f"simulated, seed {dataset.seed}", "real": "real log", "file": "log file"}
-    packages = environment.get("packages", {})
-    return [
-        ("Dataset", f"{dataset.name} ({kind.get(dataset.kind, dataset.kind)}), {_scans(dataset.scans)}"),
-        ("Seed", f"{comparison.config.get('seed', '')} (pairs, guesses, every matcher's random numbers)"),
-        ("Processor", f"{environment.get('cpu', 'unknown')}, {environment.get('cores', '?')} cores usable"),
-        ("System", f"{environment.get('system', '')} ({environment.get('machine', '')})"),
-        ("Python", str(environment.get("python", ""))),
-        ("hsslam", str(environment.get("hsslam", ""))),
-        ("Packages", ", ".join(f"{name} {version}" for name, version in packages.items())),
-    ]
-
-
-def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:].rstrip('.')}." if text else ""
-
-
-def _scans(count: int | None) -> str:
-    return "all scans" if count is None else _count(count, "scan")
-
-
-def _count(number: int, thing: str) -> str:
-    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
-
-
-def _write_pictures(pictures: list[Picture], folder: Path) -> None:
-    folder.mkdir(exist_ok=True)
-    for picture in pictures:
-        with atomic_path(folder / f"{picture.key}.png") as temporary:
-            temporary.write_bytes(picture.png)
+def _write(path: Path, content: bytes) -> None:
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content)

@@ -1,8 +1,8 @@
-"""One matcher's trials or SLAM run, in a process of its own: ``python -m hsslam_eval.worker OUT LABEL STAGE FD``.
+"""A job in a process of its own: ``python -m hsslam_eval.worker FOLDER FD``.
 
-`hsslam_eval.compare` starts it. It reads what to do from the comparison's folder, writes its record there, and
-tells how far it is on the open file descriptor ``FD``, one JSON object a line. A process of its own makes the peak
-memory that matcher's, and a crash costs that matcher only.
+`hsslam_eval.jobs` starts it. It reads the job from its folder, writes its record there, and tells how far it is on the
+open file descriptor ``FD``, one JSON object a line. A process of its own makes the peak memory that matcher's, and a
+crash costs that job only.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from typing import Any
 from hsslam.config import Config
 from hsslam.datasets.dataset import Dataset
 from hsslam.errors import DataError, HsslamError, MatcherUnavailableError
-from hsslam_eval.comparison import Failure, MatcherTrials, SlamOutcome, write_record
-from hsslam_eval.workspace import Workspace
+from hsslam_eval.comparison import Failure, MatcherTrials, SlamOutcome
+from hsslam_eval.jobs import RESULT_FILE, RUN_FOLDER, Job
+from hsslam_eval.record_files import write_record
 
 _REPORT_EVERY = 0.1
 _WARM_UP_SCANS, _WARM_UP_STEP = 40, 5
@@ -52,25 +53,28 @@ class Reporter:
         self._file.flush()
 
 
-def run_trials_stage(workspace: Workspace, label: str, reporter: Reporter) -> MatcherTrials:
-    """Run the trials of one matcher."""
+def run_trials_job(job: Job, reporter: Reporter) -> MatcherTrials:
+    """Run the trials of a job."""
     from hsslam.matching import registry
     from hsslam_eval.outcomes import trials_record
     from hsslam_eval.trials import make_pairs, run_trials
 
     reporter.progress("prepare", 0, 0)
-    contestant = workspace.contestant(label)
-    matcher = registry.create(contestant.name, contestant.parameters)
-    config = workspace.config.trial_config
-    pairs = make_pairs(workspace.dataset.open(), config)
+    matcher = registry.create(job.matcher.name, job.matcher.parameters)
+    config = job.trial_config
+    pairs = make_pairs(job.dataset.open(), config)
     result = run_trials(
-        label, matcher, pairs, config, lambda done, total: reporter.progress("trials", done, total)
+        job.matcher.label,
+        matcher,
+        pairs,
+        config,
+        lambda done, total: reporter.progress("trials", done, total),
     )
     return trials_record(result)
 
 
-def run_slam_stage(workspace: Workspace, label: str, reporter: Reporter) -> SlamOutcome:
-    """Run SLAM with one matcher and leave its run folder."""
+def run_slam_job(job: Job, place: Path, reporter: Reporter) -> SlamOutcome:
+    """Run the SLAM of a job and leave its run folder at ``place``."""
     from hsslam.environment import peak_memory_mb
     from hsslam.slam.folder import RunFolder
     from hsslam.slam.journal import Header
@@ -78,21 +82,19 @@ def run_slam_stage(workspace: Workspace, label: str, reporter: Reporter) -> Slam
     from hsslam_eval.outcomes import cpu_seconds, slam_record
 
     reporter.progress("prepare", 0, 0)
-    contestant = workspace.contestant(label)
-    config = workspace.config.slam_config(contestant)
+    config = job.slam_config
     config.matcher.create()
-    dataset = workspace.dataset.open()
+    dataset = job.dataset.open()
     began = perf_counter()
     _warm_up(config, dataset, reporter)
     warm_up_seconds = perf_counter() - began
 
-    place = workspace.run_folder(label)
     if place.exists():
         # What a failed attempt left; its matches must not shorten the time of this one.
         shutil.rmtree(place)
-    folder = RunFolder.create(place, dataset.info.name, label)
-    header = Header(workspace.source, config.model_dump(mode="json"))
-    total = workspace.scan_count(dataset)
+    folder = RunFolder.create(place, dataset.info.name, job.matcher.label)
+    header = Header(job.source, config.model_dump(mode="json"))
+    total = _scan_count(job, dataset)
     with folder.begin(header, config) as journal:
         began, cpu_began = perf_counter(), cpu_seconds()
         slam = Slam(config)
@@ -110,12 +112,13 @@ def run_slam_stage(workspace: Workspace, label: str, reporter: Reporter) -> Slam
     reporter.progress("map", 0, 0)
     note = ""
     try:
-        folder.write_result(result, config, title=f"{dataset.info.name}, {label}")
+        folder.write_result(result, config, title=f"{dataset.info.name}, {job.matcher.label}")
     except DataError as error:  # a trajectory that ran away asks for too large a map; its errors still count
         note = str(error)
     record = slam_record(
         result,
-        folder=place.relative_to(workspace.out).as_posix(),
+        folder=place.name,
+        seed=job.seed,
         relations=dataset.relations(),
         truth=dataset.truth(),
         wall_seconds=wall,
@@ -130,24 +133,37 @@ def run_slam_stage(workspace: Workspace, label: str, reporter: Reporter) -> Slam
 
 
 def main(arguments: list[str]) -> int:
-    """Do one stage; the exit code is 0 where its record was written."""
-    out, label, stage, descriptor = arguments
+    """Do one job; the exit code is 0 where its record was written."""
+    folder, reporter = Path(arguments[0]), Reporter(int(arguments[1]))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash is told in a line, not in a core file
-    reporter = Reporter(int(descriptor))
+    stage, seed = "trials", 0
     try:
-        workspace = Workspace.open(Path(out))
-        run = run_trials_stage if stage == "trials" else run_slam_stage
-        write_record(workspace.record(label, stage), run(workspace, label, reporter))
+        job = Job.load(folder)
+        stage, seed = job.kind, job.seed
+        record: MatcherTrials | SlamOutcome
+        if job.kind == "trials":
+            record = run_trials_job(job, reporter)
+        else:
+            record = run_slam_job(job, folder / RUN_FOLDER, reporter)
+        write_record(folder / RESULT_FILE, record)
     except MatcherUnavailableError as error:
-        reporter.failure(Failure("unavailable", error.reason, error.remedy))
+        reporter.failure(Failure("unavailable", error.reason, error.remedy, seed))
     except HsslamError as error:
-        reporter.failure(Failure(stage, str(error)))
+        reporter.failure(Failure(stage, str(error), "", seed))
     except (Exception, SystemExit) as error:  # whatever a matcher may raise: it costs its row only
         traceback.print_exc()
-        reporter.failure(Failure(stage, f"{type(error).__name__}: {error}"))
+        reporter.failure(Failure(stage, f"{type(error).__name__}: {error}", "", seed))
     else:
         return 0
     return 1
+
+
+def _scan_count(job: Job, dataset: Dataset) -> int:
+    """How many scans there will be, 0 where that is not known without reading them."""
+    known, wanted = dataset.info.scan_count, job.dataset.scans
+    if known is None:
+        return wanted or 0
+    return min(known, wanted) if wanted is not None else known
 
 
 def _warm_up(config: Config, dataset: Dataset, reporter: Reporter) -> None:

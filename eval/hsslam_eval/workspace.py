@@ -1,18 +1,16 @@
-"""The folder of a comparison: what is being compared, and the records of what is done.
+"""The folder of a comparison: what is being compared, and the jobs that are done.
 
 ::
 
-    compare.yaml             the resolved config, the dataset and the version: another comparison is refused
-    records/LABEL.trials.json, records/LABEL.slam.json    there once that part is complete
-    runs/LABEL/              the run folder
-    logs/LABEL.STAGE.txt     whatever the matcher printed
-    comparison.json          everything put together
+    compare.yaml         the resolved config, the datasets and the version: another comparison is refused
+    jobs/NAME/           a job's folder, see `hsslam_eval.jobs`
+    comparison.json      everything put together
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,12 +18,12 @@ from typing import Any
 import yaml
 
 from hsslam import plugin_files
-from hsslam.config import read_yaml, validate
-from hsslam.datasets.dataset import Dataset
+from hsslam.config import read_yaml
 from hsslam.errors import ConfigError, DataError
 from hsslam.io.atomic import atomic_path
 from hsslam.version import __version__
-from hsslam_eval.compare_config import CompareConfig, Contestant, DatasetSpec
+from hsslam_eval.compare_config import CompareConfig, DatasetSpec
+from hsslam_eval.jobs import Job
 
 _FILE = "compare.yaml"
 
@@ -40,16 +38,18 @@ class Workspace:
         The folder.
     config : CompareConfig
         Everything that decides what is done.
-    dataset : DatasetSpec
+    datasets : sequence of DatasetSpec
         On what.
     """
 
     out: Path
     config: CompareConfig
-    dataset: DatasetSpec
+    datasets: Sequence[DatasetSpec]
 
     @classmethod
-    def prepare(cls, out: Path, config: CompareConfig, dataset: DatasetSpec) -> Workspace:
+    def prepare(
+        cls, out: Path, config: CompareConfig, datasets: DatasetSpec | Sequence[DatasetSpec]
+    ) -> Workspace:
         """Make the folder, or come back to it.
 
         Raises
@@ -59,7 +59,7 @@ class Workspace:
         DataError
             It holds something else, or cannot be made.
         """
-        workspace = cls(out, config, dataset)
+        workspace = cls(out, config, [datasets] if isinstance(datasets, DatasetSpec) else list(datasets))
         try:
             out.mkdir(parents=True, exist_ok=True)
             held = sorted(item.name for item in out.iterdir())
@@ -71,71 +71,27 @@ class Workspace:
             raise DataError(
                 f"{out}: holds something else than a comparison ({held[0]}); choose another folder"
             )
-        for name in ("records", "runs", "logs"):
-            (out / name).mkdir(exist_ok=True)
-        data_dir = None if dataset.data_dir is None else str(dataset.data_dir)
-        apart = {"data_dir": data_dir, "limits": config.limits.model_dump()}
         with atomic_path(out / _FILE) as temporary:
-            temporary.write_text(
-                yaml.safe_dump({**workspace._identity(), **apart}, sort_keys=False),
-                encoding="utf-8",
-            )
+            temporary.write_text(yaml.safe_dump(workspace._identity(), sort_keys=False), encoding="utf-8")
         return workspace
 
-    @classmethod
-    def open(cls, out: Path) -> Workspace:
-        """Read what `prepare` wrote; raises what it raises."""
-        data = read_yaml(out / _FILE)
-        spec = {**data["dataset"], "data_dir": data["data_dir"]}
-        return cls(
-            out,
-            validate(CompareConfig, {**data["config"], "limits": data["limits"]}, source=str(out / _FILE)),
-            validate(DatasetSpec, spec, source=str(out / _FILE)),
-        )
-
-    def record(self, label: str, stage: str) -> Path:
-        """Where the record of a stage goes."""
-        return self.out / "records" / f"{label}.{stage}.json"
-
-    def run_folder(self, label: str) -> Path:
-        """Where the SLAM run goes."""
-        return self.out / "runs" / label
-
-    def log(self, label: str, stage: str) -> Path:
-        """Where the output of a stage's process goes."""
-        return self.out / "logs" / f"{label}.{stage}.txt"
-
-    @property
-    def source(self) -> dict[str, Any]:
-        """The dataset as a journal's header names it."""
-        spec = self.dataset
-        return {"source": spec.name, "scans": spec.scans, "on_error": spec.on_error}
-
-    def contestant(self, label: str) -> Contestant:
-        """The matcher of that label."""
-        return next(contestant for contestant in self.config.contestants if contestant.label == label)
-
-    def scan_count(self, dataset: Dataset) -> int:
-        """How many scans there will be, 0 where that is not known without reading them."""
-        known = dataset.info.scan_count
-        wanted = self.dataset.scans
-        if known is None:
-            return wanted or 0
-        return min(known, wanted) if wanted is not None else known
+    def folder(self, job: Job) -> Path:
+        """Where a job's files go."""
+        return self.out / "jobs" / job.name
 
     def _identity(self) -> dict[str, Any]:
         """What decides the results: where the data lie and how long a matcher may take do not."""
         config = {key: value for key, value in self.config.resolved().items() if key != "limits"}
         return {
             "version": __version__,
-            "dataset": self.dataset.model_dump(mode="json", exclude={"data_dir"}),
+            "datasets": [dataset.model_dump(mode="json", exclude={"data_dir"}) for dataset in self.datasets],
             "config": config,
             "plugins": plugin_files.fingerprints(),
         }
 
 
 def _check_same(out: Path, was: Mapping[str, Any], now: Mapping[str, Any]) -> None:
-    before, after = (_flat({**side, "data_dir": None, "limits": None}) for side in (was, now))
+    before, after = (_flat(side) for side in (was, now))
     different = [
         f"{key} was {before.get(key, 'unset')}, now {after.get(key, 'unset')}"
         for key in sorted({*before, *after})

@@ -1,4 +1,4 @@
-"""``hsslam compare``: several matchers on one dataset, and a report."""
+"""``hsslam compare``: several matchers on one dataset or more, and a report."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from hsslam_eval.compare import CompareConfig
     from hsslam_eval.comparison import Comparison
 
+_PAGE_ONLY = ("pairs", "slam-runs")
 _STAGES = {
     "prepare": ("loading; compiling kernels on the first run", ""),
     "trials": ("trials", "trials"),
@@ -31,18 +32,21 @@ _STAGES = {
 }
 
 
-class ManyMatchers(TyperCommand):
-    """Lets ``--matchers hsl hide icp`` take every name up to the next option."""
+_LISTS = ("--matchers", "--datasets")
+
+
+class ManyNames(TyperCommand):
+    """Lets ``--matchers hsl hide icp`` take every name up to the next option; ``--datasets`` too."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Join the names that follow ``--matchers`` with commas, at which the option is split again."""
+        """Join the names that follow such an option with commas, at which it is split again."""
         joined: list[str] = []
         taking = False
         for arg in args:
             if arg.startswith("-"):
-                taking = arg == "--matchers"
+                taking = arg in _LISTS
                 joined.append(arg)
-            elif taking and joined[-1] != "--matchers":
+            elif taking and joined[-1] not in _LISTS:
                 joined[-1] += f",{arg}"
             else:
                 joined.append(arg)
@@ -59,6 +63,10 @@ def compare(
         ),
     ] = None,
     dataset: Annotated[str | None, typer.Option(metavar="NAME|PATH", help="The same, as an option.")] = None,
+    datasets: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME|PATH...", help="Several: each has its part of the report."),
+    ] = None,
     matchers: Annotated[
         list[str] | None,
         typer.Option(
@@ -67,7 +75,17 @@ def compare(
             autocompletion=complete.matchers,
         ),
     ] = None,
-    trials: Annotated[int | None, typer.Option(min=1, metavar="N", help="Trials of each matcher.")] = None,
+    trials: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Trials of each matcher and seed.")
+    ] = None,
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Run everything with N seeds: --seed and the ones after it; 1 if left out.",
+        ),
+    ] = None,
     protocol: Annotated[
         str | None,
         typer.Option(
@@ -117,59 +135,72 @@ def compare(
     Trials with known truth and SLAM with each matcher; tables here, and a report in HTML, Markdown and CSV.
     Given the folder of an earlier comparison, goes on with what is missing in it.
     """
-    from hsslam_eval.compare import DatasetSpec
-    from hsslam_eval.compare import compare as run_comparison
+    from hsslam_eval.compare import DatasetSpec, compare_datasets, part_names
     from hsslam_eval.report import write_report
 
-    if name is not None and dataset is not None:
-        raise ConfigError(f"the dataset is named twice: {name} and --dataset {dataset}")
+    named = _datasets(name, dataset, split(datasets or ()))
     given = {
         "seed": seed,
+        "seeds": seeds,
         "run_trials": False if no_trials else None,
         "run_slam": False if no_slam else None,
         "trials": _without_none({"count": trials, "protocol": protocol}),
         "limits": _without_none({"step": time_limit}),
     }
     resolved = resolve(config, split(matchers or ()), _without_none(given), settings or ())
-    spec = DatasetSpec(
-        name=name or dataset or "office",
-        data_dir=data_dir,
-        seed=resolved.seed,
-        scans=scans,
-        on_error=policy(on_error),
-    )
-    info = spec.open().info
-    folder = out if out is not None else Path("runs") / f"{datetime.now():%Y%m%d-%H%M%S}-{info.name}-compare"
+    specs = [
+        DatasetSpec(name=one, data_dir=data_dir, seed=resolved.seed, scans=scans, on_error=policy(on_error))
+        for one in named
+    ]
+    infos = [spec.open().info for spec in specs]
+    title = "+".join(info.name for info in infos)
+    folder = out if out is not None else Path("runs") / f"{datetime.now():%Y%m%d-%H%M%S}-{title}-compare"
     command = shlex.join(["hsslam", *sys.argv[1:]])
-    labels = [contestant.label for contestant in resolved.contestants]
-    with progress(quiet) as shown:
-        comparison = run_comparison(resolved, spec, folder, Tell(shown, labels), command=command)
-        shown.stage("writing the report")
-        write_report(comparison, folder)
+    try:
+        with progress(quiet) as shown:
+            tell = Tell(shown, part_names(resolved, specs))
+            study = compare_datasets(resolved, specs, folder, tell, command=command)
+            shown.stage("writing the report")
+            write_report(study, folder)
+    except KeyboardInterrupt as error:
+        again = command if out is not None else f"{command} --out {shlex.quote(str(folder))}"
+        raise KeyboardInterrupt(f"what is done is kept; go on with: {again}") from error
     if not quiet:
-        tables(comparison)
+        for comparison in study.comparisons:
+            if len(specs) > 1:
+                console.say(f"\n{comparison.dataset.name}")
+            tables(comparison)
         console.say(f"\nreport: {folder / 'report.html'}")
-        if info.attribution:
-            console.say(f"\n{info.attribution}")
+        for attribution in dict.fromkeys(info.attribution for info in infos if info.attribution):
+            console.say(f"\n{attribution}")
+
+
+def _datasets(name: str | None, dataset: str | None, datasets: Sequence[str]) -> list[str]:
+    ways = [name] if name else []
+    ways += [f"--dataset {dataset}"] if dataset else []
+    ways += ["--datasets"] if datasets else []
+    if len(ways) > 1:
+        raise ConfigError(f"the dataset is named twice: {' and '.join(ways)}; name all after --datasets")
+    return list(datasets) or [name or dataset or "office"]
 
 
 class Tell:
-    """Turns what `hsslam_eval.compare.compare` tells into stages of progress."""
+    """Turns what `hsslam_eval.compare.compare_datasets` tells into stages of progress; takes its `part_names`."""
 
-    def __init__(self, shown: Progress, labels: Sequence[str]) -> None:
+    def __init__(self, shown: Progress, parts: Sequence[str]) -> None:
         self._shown = shown
-        self._labels = labels
+        self._parts = parts
         self._at = ("", "")
 
-    def __call__(self, stage: str, matcher: str, done: int, total: int) -> None:
+    def __call__(self, stage: str, part: str, done: int, total: int) -> None:
         """Take a step."""
         interrupt.check()
         if stage not in _STAGES:
             return
         what, unit = _STAGES[stage]
-        if (stage, matcher) != self._at:
-            self._at = (stage, matcher)
-            place = f"[{self._labels.index(matcher) + 1}/{len(self._labels)}] {matcher}: {what}"
+        if (stage, part) != self._at:
+            self._at = (stage, part)
+            place = f"[{self._parts.index(part) + 1}/{len(self._parts)}] {part}: {what}"
             self._shown.stage(place, total or None, unit)
         if unit:
             self._shown.update(done)
@@ -213,7 +244,7 @@ def resolve(
         if dot and section in sections:
             apply_override(sections[section], rest)
         else:
-            own = setting.partition("=")[0] in ("seed", "run_trials", "run_slam")
+            own = setting.partition("=")[0] in ("seed", "seeds", "run_trials", "run_slam")
             apply_override(data if own else slam, setting)
     return validate(
         CompareConfig,
@@ -224,14 +255,17 @@ def resolve(
 
 def tables(comparison: Comparison) -> None:
     """Print the report's tables."""
-    from hsslam_eval.tables import slam_tables, trial_tables, verdict
+    from hsslam_eval.slam_tables import slam_tables
+    from hsslam_eval.trial_tables import trial_tables, verdict
 
-    for table in (*trial_tables(comparison), *slam_tables(comparison)):
+    # What the page has beyond these is too wide or too long for a terminal.
+    shown = [t for t in (*trial_tables(comparison), *slam_tables(comparison)) if t.name not in _PAGE_ONLY]
+    for table in shown:
         console.say(f"\n{table.title}")
         console.table(
-            ("matcher", *table.headings),
+            (table.corner, *table.headings),
             [
-                (row.label, *(_cell(cell.text, cell.interval) for cell in row.cells))
+                (row.label, *(_cell(cell.text, cell.interval, cell.best) for cell in row.cells))
                 for row in table.rows
                 if row.cells
             ],
@@ -247,5 +281,6 @@ def _without_none(values: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in values.items() if value is not None}
 
 
-def _cell(text: str, interval: str) -> str:
+def _cell(text: str, interval: str, best: bool) -> str:
+    text = f"{text} ★" if best else text
     return f"{text} ({interval})" if interval else text

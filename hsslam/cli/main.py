@@ -68,7 +68,7 @@ def hsslam(
 
 app.command("init")(init.init)
 app.command("run")(run.run)
-app.command("compare", cls=compare.ManyMatchers)(compare.compare)
+app.command("compare", cls=compare.ManyNames)(compare.compare)
 app.command("match")(match.match)
 app.command("eval")(evaluate.evaluate)
 app.command("convert")(convert.convert)

@@ -1,0 +1,108 @@
+"""Which differences between matchers the trials can tell: every pair, by every measure, one family of tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam_eval.comparison import Comparison, MatcherTrials
+from hsslam_eval.paired_tests import PairedTest, holm, mcnemar, signed_rank
+
+Measure = Literal["success", "displacement", "rotation", "time"]
+MEASURES: tuple[Measure, ...] = ("success", "displacement", "rotation", "time")
+"""By the first definition of success; errors over all trials; time per match."""
+
+
+@dataclass(frozen=True)
+class Duel:
+    """Two matchers by one measure.
+
+    Parameters
+    ----------
+    first, second : str
+        Labels.
+    measure : str
+        One of `MEASURES`.
+    test : PairedTest
+        Of the first against the second.
+    corrected : float
+        p after Holm's correction over the whole family.
+    level : float
+        Below which ``corrected`` counts.
+    """
+
+    first: str
+    second: str
+    measure: Measure
+    test: PairedTest
+    corrected: float
+    level: float
+
+    @property
+    def better(self) -> str:
+        """Label of the one that is better; empty where the difference is not significant."""
+        if not self.corrected < self.level or self.test.effect == 0.0:
+            return ""
+        ahead = self.test.effect > 0.0 if self.measure == "success" else self.test.effect < 0.0
+        return self.first if ahead else self.second
+
+
+def duels(comparison: Comparison) -> list[Duel]:
+    """Test every pair of matchers that have trials in common by every measure."""
+    trials = {m.label: m.trials for m in comparison.matchers if m.trials is not None}
+    if len(trials) < 2:
+        return []
+    level = 1.0 - float(comparison.config["trials"]["confidence"])
+    made = [
+        (one, other, measure, _test(trials[one], trials[other], measure))
+        for one, other in combinations(trials, 2)
+        for measure in MEASURES
+    ]
+    corrected = holm([test.p for *_, test in made])
+    return [
+        Duel(one, other, measure, test, float(p), level)
+        for (one, other, measure, test), p in zip(made, corrected, strict=True)
+    ]
+
+
+def winners(found: list[Duel]) -> Mapping[Measure, str]:
+    """By measure the matcher that is significantly better than every other one, where there is one."""
+    out: dict[Measure, str] = {}
+    for measure in MEASURES:
+        of_measure = [duel for duel in found if duel.measure == measure]
+        for label in dict.fromkeys(name for duel in of_measure for name in (duel.first, duel.second)):
+            if all(duel.better == label for duel in of_measure if label in (duel.first, duel.second)):
+                out[measure] = label
+    return out
+
+
+def succeeded(trials: MatcherTrials) -> NDArray[np.bool_]:
+    """Which trials succeeded by the first definition, (T,)."""
+    definition, data = trials.successes[0], trials.data
+    near = (np.array(data.displacement_m) < definition.displacement_limit_m) & (
+        np.array(data.rotation_deg) < definition.rotation_limit_deg
+    )
+    answered = np.array([not failure for failure in data.failure], dtype=np.bool_)
+    return np.asarray(near & answered, dtype=np.bool_)
+
+
+_VALUES: dict[Measure, Callable[[MatcherTrials], NDArray[np.float64]]] = {
+    "success": lambda trials: succeeded(trials).astype(np.float64),
+    "displacement": lambda trials: np.array(trials.data.displacement_m, dtype=np.float64),
+    "rotation": lambda trials: np.array(trials.data.rotation_deg, dtype=np.float64),
+    "time": lambda trials: np.array(trials.data.seconds, dtype=np.float64),
+}
+
+
+def _test(one: MatcherTrials, other: MatcherTrials, measure: Measure) -> PairedTest:
+    # A matcher may lack a seed that failed; what is left of both is still the same trials in the same order.
+    shared = set(one.data.seed) & set(other.data.seed)
+    first, second = (
+        _VALUES[measure](trials)[np.isin(trials.data.seed, list(shared))] for trials in (one, other)
+    )
+    return mcnemar(first, second) if measure == "success" else signed_rank(first, second)

@@ -1,0 +1,102 @@
+"""A report's tables as files: CSV at full precision, and LaTeX for the booktabs package."""
+
+from __future__ import annotations
+
+import csv
+import re
+from io import StringIO
+
+from hsslam_eval.tables import Cell, Row, Table
+
+_LATEX = {
+    "\\": r"\textbackslash{}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "{": r"\{",
+    "}": r"\}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"$<$",
+    ">": r"$>$",
+    "|": r"\textbar{}",
+    "±": r"$\pm$",
+    "°": r"$^\circ$",
+    "Δ": r"$\Delta$",
+    "★": r"$\star$",
+    "\N{EN DASH}": "--",
+    "\N{NO-BREAK SPACE}": "~",
+}
+
+
+def to_csv(table: Table) -> str:
+    """A line a row; numbers with all their digits, a column more for each end of an interval, or for a spread.
+
+    A row that is missing has its reason in the last column, ``note``.
+    """
+    widths = [_width(table.rows, place) for place in range(len(table.headings))]
+    headings = [table.corner]
+    for heading, width in zip(table.headings, widths, strict=True):
+        heading = heading.replace("\N{NO-BREAK SPACE}", " ")
+        endings = {3: ("", " low", " high"), 2: ("", " spread")}.get(width, ("",))
+        headings += [heading + ending for ending in endings]
+    out = StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow([*headings, "note"])
+    for row in table.rows:
+        values: list[str] = []
+        for place, width in enumerate(widths):
+            values += _values(row.cells[place], width) if row.cells else [""] * width
+        writer.writerow([row.label, *values, row.note])
+    return out.getvalue()
+
+
+def to_latex(table: Table, label: str) -> str:
+    r"""A ``table`` float: needs ``\usepackage{booktabs}``; what is best is bold, intervals are below in small."""
+    columns = len(table.headings)
+    lines = [
+        r"% \usepackage{booktabs}",
+        r"\begin{table}",
+        r"\centering",
+        rf"\caption{{{_escape(table.title)}. {_escape(table.explanation)}}}",
+        rf"\label{{tab:{label}}}",
+        rf"\begin{{tabular}}{{l{'r' * columns}}}",
+        r"\toprule",
+        " & ".join(_escape(heading) for heading in (table.corner, *table.headings)) + r" \\",
+        r"\midrule",
+    ]
+    for row in table.rows:
+        if row.note:
+            lines.append(rf"{_escape(row.label)} & \multicolumn{{{columns}}}{{l}}{{{_escape(row.note)}}} \\")
+            continue
+        texts = [
+            rf"\textbf{{{_escape(cell.text)}}}" if cell.best else _escape(cell.text) for cell in row.cells
+        ]
+        lines.append(" & ".join([_escape(row.label), *texts]) + r" \\")
+        if any(cell.interval for cell in row.cells):
+            small = [
+                rf"{{\scriptsize {_escape(cell.interval)}}}" if cell.interval else "" for cell in row.cells
+            ]
+            lines.append(" & ".join(["", *small]) + r" \\")
+    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", r"\end{table}", ""])
+
+
+def _width(rows: list[Row], place: int) -> int:
+    return max([len(row.cells[place].numbers) for row in rows if row.cells] or [1]) or 1
+
+
+def _values(cell: Cell, width: int) -> list[str]:
+    values = [repr(float(value)) for value in cell.numbers] or [_plain(cell.text)]
+    return values + [""] * (width - len(values))
+
+
+def _plain(text: str) -> str:
+    return "" if text == "\N{EN DASH}" else text
+
+
+def _escape(text: str) -> str:
+    escaped = "".join(_LATEX.get(character, character) for character in text)
+    # An arrow and the like: pdflatex stops at what it does not know.
+    return re.sub(r"[^\x00-\x7f]", "?", escaped)
