@@ -96,9 +96,7 @@ def full() -> Comparison:
     return comparison(
         MatcherOutcome("good", "good", {}, trials(rng, 1.0, 0.0), [slam("good")]),
         MatcherOutcome("bad", "bad", {}, trials(rng, 4.0, 0.5), [], [Failure("slam", "it <broke> & fell")]),
-        MatcherOutcome(
-            "gone", "gone", {}, None, [], [Failure("unavailable", "no module", "pip install it")]
-        ),
+        MatcherOutcome("gone", "gone", {}, None, [], [Failure("unavailable", "no module", "pip install it")]),
         MatcherOutcome("raising", "raising", {}, trials(rng, 1.0, 1.0, raising=True), [slam("raising")]),
         attribution="Recorded by somebody, CC-BY 3.0",
     )
@@ -161,7 +159,11 @@ def test_the_page_loads_nothing(folder: Path) -> None:
 def test_every_link_in_the_page_leads_somewhere(folder: Path) -> None:
     page = Page((folder / "report.html").read_text(encoding="utf-8"))
     places = {attributes["id"] for _, attributes in page.tags if "id" in attributes}
-    links = {(attributes["href"] or "").removeprefix("#") for tag, attributes in page.tags if tag == "a" and "download" not in attributes}
+    links = {
+        (attributes["href"] or "").removeprefix("#")
+        for tag, attributes in page.tags
+        if tag == "a" and "download" not in attributes
+    }
     assert links and links <= places
 
 

@@ -126,8 +126,13 @@ def compare_datasets(
     return study
 
 
-def jobs_of(config: CompareConfig, dataset: DatasetSpec, contestant: Contestant, kind: Kind) -> list[Job]:
-    """The jobs of one matcher on one dataset, one for each seed."""
+def jobs_of(config: CompareConfig, dataset: DatasetSpec, contestant: Contestant) -> list[Job]:
+    """The jobs of one matcher on one dataset: for each seed its trials and its SLAM run, where wanted."""
+    kinds: list[Kind] = []
+    if config.run_trials:
+        kinds.append("trials")
+    if config.run_slam:
+        kinds.append("slam")
     return [
         Job(
             kind=kind,
@@ -138,6 +143,7 @@ def jobs_of(config: CompareConfig, dataset: DatasetSpec, contestant: Contestant,
             slam=config.slam,
         )
         for step in range(config.seeds)
+        for kind in kinds
     ]
 
 
@@ -177,12 +183,7 @@ class _Row:
     def outcome(self) -> MatcherOutcome:
         config, failures = self.workspace.config, list[Failure]()
         trials, runs = list[MatcherTrials](), list[SlamOutcome]()
-        kinds: list[Kind] = []
-        if config.run_trials:
-            kinds.append("trials")
-        if config.run_slam:
-            kinds.append("slam")
-        for job in (job for kind in kinds for job in jobs_of(config, self.dataset, self.contestant, kind)):
+        for job in jobs_of(config, self.dataset, self.contestant):
             done = self._run(job)
             match done:
                 case MatcherTrials():
