@@ -327,6 +327,8 @@ class Comparison:
         `hsslam.environment.environment`.
     matchers : list of MatcherOutcome
         In the order in which they were asked for.
+    notes : list of str
+        On what terms runs that were there already are compared.
     """
 
     dataset: DatasetRecord
@@ -335,6 +337,7 @@ class Comparison:
     created: str
     environment: dict[str, Any]
     matchers: list[MatcherOutcome]
+    notes: list[str] = field(default_factory=list)
 
     @property
     def failed(self) -> list[MatcherOutcome]:

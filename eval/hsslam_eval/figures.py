@@ -246,5 +246,7 @@ def _picture(key: str, caption: str, figure: Figure, shown: Literal["png", "svg"
             buffer = BytesIO()
             figure.savefig(buffer, format=kind, metadata=_METADATA[kind])
             files[kind] = buffer.getvalue()
+            # Laid out once: the places are shares of the figure, and half of the time goes there.
+            figure.set_layout_engine(None)
     width, height = figure.get_size_inches()
     return Picture(key, caption, files, shown, round(96 * width), round(96 * height))

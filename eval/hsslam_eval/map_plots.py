@@ -31,10 +31,10 @@ def trajectory(label: str, slam: SlamOutcome, look: Style, limits: Limits) -> Fi
     pattern: Any = "-" if slam.reference_kind == "truth" else (0, (2, 2))
     axes.plot(reference[:, 0], reference[:, 1], color="#b0b0b0", linewidth=3.0, linestyle=pattern, label=name)
     axes.plot(path[:, 0], path[:, 1], color=look.colour, linewidth=1.1, label=label)
-    for accepted, colour, width in ((False, _REJECTED, 0.7), (True, _ACCEPTED, 1.2)):
+    for accepted, colour, width in ((False, _REJECTED, 0.6), (True, _ACCEPTED, 0.6)):
         loops = [(loop.first, loop.second) for loop in slam.loops if loop.accepted is accepted]
         if loops:
-            axes.add_collection(LineCollection(loops, colors=colour, linewidths=width, zorder=3.0))
+            axes.add_collection(LineCollection(loops, colors=colour, linewidths=width, alpha=0.7, zorder=3.0))
             # A loop that closes well joins two places on one another: a dot shows it where a line would not.
             ends = np.array([second for _, second in loops])
             axes.plot(ends[:, 0], ends[:, 1], ".", color=colour, markersize=3 if accepted else 2, zorder=3.0)
@@ -47,7 +47,7 @@ def trajectory(label: str, slam: SlamOutcome, look: Style, limits: Limits) -> Fi
             axes.add_line(
                 Line2D([], [], color=colour, marker=".", linewidth=1.2, label=f"loop {name} ({count})")
             )
-    legend_below(figure, axes)
+    legend_below(figure, axes, 2)
     return figure
 
 

@@ -31,14 +31,14 @@ def panel(width: float, height: float) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def legend_below(figure: Figure, axes: Axes) -> None:
-    """Put the legend under the panel."""
+def legend_below(figure: Figure, axes: Axes, columns: int = 3) -> None:
+    """Put the legend under the panel, in so many columns."""
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(
         handles,
         labels,
         loc="outside lower center",
-        ncols=min(3, len(labels)),
+        ncols=min(columns, len(labels)),
         frameon=False,
         handlelength=3.2,
     )

@@ -72,11 +72,14 @@ def equal_terms(study: Study) -> list[str]:
             "Equal in SLAM: the log, every setting of tracking, keyframes, loops and optimisation, and the pose graph. "
             "The matcher tracks every scan and, unless the settings name another, closes the loops."
         )
+    several = len(study.comparisons) > 1
     if told:
         told.append(
             "Not equal: what a matcher does with its time. Each runs with its own settings, listed here; evaluations "
             "and time per match are reported beside every error."
         )
+    for comparison in study.comparisons:
+        told += [f"{comparison.dataset.name}: {note}" if several else note for note in comparison.notes]
     return told
 
 

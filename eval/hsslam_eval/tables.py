@@ -42,7 +42,10 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A titled table; headings carry the units, ``name`` is the stem of its files."""
+    """A titled table; headings carry the units, ``name`` is the stem of its files.
+
+    ``mark`` follows what is best: a sign that print and plain text keep.
+    """
 
     name: str
     title: str
@@ -50,6 +53,7 @@ class Table:
     headings: list[str]
     rows: list[Row]
     corner: str = "matcher"
+    mark: str = " ★"
 
 
 def number(value: float, scale: float = 1.0) -> str:

@@ -170,6 +170,7 @@ def _pairs(found: list[Duel], limit: str) -> Table:
         headings,
         rows,
         "pair",
+        mark="",
     )
 
 
@@ -177,7 +178,10 @@ def _duel(duel: Duel) -> list[Cell]:
     test, scale = duel.test, _UNITS[duel.measure][1]
     effect = f"{test.wins} : {test.losses}" if duel.measure == "success" else f"r = {test.effect:+.2f}"
     shown = number(test.difference, scale)
-    shown = f"+{shown}" if test.difference > 0.0 else shown
+    if not float(shown):
+        shown = "0"
+    elif test.difference > 0.0:
+        shown = f"+{shown}"
     p = duel.corrected
     return [
         Cell(

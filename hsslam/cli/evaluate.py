@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from hsslam.cli import accuracy, console
 from hsslam.cli.options import AsJson, DataDir, OdomTopic, Quiet, Scans, ScanTopic, Seed
-from hsslam.cli.progress import Progress, progress
+from hsslam.cli.progress import progress
 from hsslam.errors import DataError
-
-if TYPE_CHECKING:
-    from hsslam.datasets.dataset import Dataset
-    from hsslam.trajectory import Trajectory
-
-_SAME_STAMP = 5e-6
-"""Stamps this close are one, written with fewer digits (s)."""
 
 
 def evaluate(
@@ -42,18 +35,15 @@ def evaluate(
     """
     from hsslam.datasets.catalogue import join_source, open_dataset
     from hsslam.io.relations import read_relations
-    from hsslam.io.trajectory_csv import read_trajectory_csv
-    from hsslam.io.tum import read_tum
     from hsslam_eval.accuracy import measure
+    from hsslam_eval.placement import odometry_of, read_trajectory
 
-    read = read_trajectory_csv if trajectory.suffix == ".csv" else read_tum
-    found = read(trajectory)
     source = join_source(dataset, scan_topic=scan_topic, odom_topic=odom_topic)
     log = open_dataset(source, data_dir=data_dir, seed=seed or 0, scans=scans)
     with progress(quiet or as_json) as shown:
         shown.stage(f"reading {log.info.name}", log.info.scan_count or scans, "scans")
-        odometry = _odometry(log, shown)
-    found = found if trajectory.suffix == ".csv" else place(found, odometry, trajectory)
+        odometry = odometry_of(log, shown.update)
+    found = read_trajectory(trajectory, odometry)
     known = read_relations(relations, stamps=odometry.stamps) if relations is not None else log.relations()
     errors = measure(found, odometry, log.truth(), known)
     if not errors:
@@ -80,50 +70,3 @@ def evaluate(
     )
     if log.info.attribution:
         console.say(f"\n{log.info.attribution}")
-
-
-def _odometry(log: Dataset, shown: Progress) -> Trajectory:
-    import numpy as np
-
-    from hsslam.trajectory import Trajectory
-
-    stamps, poses, indices = [], [], []
-    for done, scan in enumerate(log.scans(), start=1):
-        stamps.append(scan.stamp)
-        poses.append(scan.odometry)
-        indices.append(scan.index)
-        shown.update(done)
-    if not poses:
-        raise DataError(f"{log.info.name}: holds no scan")
-    return Trajectory(np.array(stamps), np.array(poses), np.array(indices, dtype=np.int64))
-
-
-def place(trajectory: Trajectory, odometry: Trajectory, source: Path | str) -> Trajectory:
-    """Find the scan that each pose of a TUM file belongs to.
-
-    A file with a line per scan is taken in the log's order. A shorter one goes by stamps, each line to the
-    next scan with that very stamp: stamps repeat and step back, so the nearest in time may be another scan.
-
-    Raises
-    ------
-    DataError
-        A stamp is not in what is left of the log.
-    """
-    import numpy as np
-
-    from hsslam.trajectory import Trajectory
-
-    if len(trajectory) == len(odometry):
-        return Trajectory(odometry.stamps, trajectory.poses, odometry.indices)
-    indices = []
-    at = 0
-    for number, stamp in enumerate(trajectory.stamps, start=1):
-        same = np.flatnonzero(np.abs(odometry.stamps[at:] - stamp) < _SAME_STAMP)
-        if len(same) == 0:
-            raise DataError(
-                f"{source}: pose {number}: no scan of the log after those before it has the stamp {stamp:.6f}; "
-                f"expected stamps as recorded, or a pose for each of the {len(odometry):,} scans"
-            )
-        at += int(same[0]) + 1
-        indices.append(int(odometry.indices[at - 1]))
-    return Trajectory(trajectory.stamps, trajectory.poses, np.array(indices, dtype=np.int64))

@@ -20,6 +20,7 @@ from hsslam.cli import (
     match,
     matchers,
     plugin,
+    report,
     reproduce,
     run,
 )
@@ -69,6 +70,7 @@ def hsslam(
 app.command("init")(init.init)
 app.command("run")(run.run)
 app.command("compare", cls=compare.ManyNames)(compare.compare)
+app.command("report")(report.report)
 app.command("match")(match.match)
 app.command("eval")(evaluate.evaluate)
 app.command("convert")(convert.convert)
