@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import fcntl
 import json
 import os
 import shutil
@@ -52,18 +53,24 @@ class Browser:
         self._home = tempfile.TemporaryDirectory(prefix="hsslam-browser-", ignore_cleanup_errors=True)
         to_browser, commands = os.pipe()
         answers, from_browser = os.pipe()
-        # The protocol speaks on descriptors 3 and 4; the shell puts them there.
+        # Away from 3 and 4, on which the browser expects them: one must not overwrite the other.
+        ends = [fcntl.fcntl(end, fcntl.F_DUPFD, 10) for end in (to_browser, from_browser)]
+
+        def place() -> None:
+            os.dup2(ends[0], 3)
+            os.dup2(ends[1], 4)
+
         self._process = subprocess.Popen(
-            ["/bin/sh", "-c", f'exec "$0" "$@" 3<&{to_browser} 4>&{from_browser}', executable]
-            + [*OPTIONS, f"--user-data-dir={self._home.name}", "about:blank"],
-            pass_fds=[to_browser, from_browser],
+            [executable, *OPTIONS, f"--user-data-dir={self._home.name}", "about:blank"],
+            pass_fds=[3, 4],
+            preexec_fn=place,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
         )
-        os.close(to_browser)
-        os.close(from_browser)
+        for end in (*ends, to_browser, from_browser):
+            os.close(end)
         self._commands, self._answers = os.fdopen(commands, "wb"), os.fdopen(answers, "rb")
         self._sent = 0
         self._rest = b""

@@ -90,11 +90,11 @@ def comparison(*matchers: MatcherOutcome, attribution: str = "") -> Comparison:
     )
 
 
-@pytest.fixture(scope="module")
-def full() -> Comparison:
+def full_comparison() -> Comparison:
+    """One matcher that does well, one whose SLAM failed, one that is unavailable, one that raises."""
     rng = np.random.default_rng(3)
     return comparison(
-        MatcherOutcome("good", "good", {}, trials(rng, 1.0, 0.0), [slam("good")]),
+        MatcherOutcome("good", "good", {"memory_size": 30}, trials(rng, 1.0, 0.0), [slam("good")]),
         MatcherOutcome("bad", "bad", {}, trials(rng, 4.0, 0.5), [], [Failure("slam", "it <broke> & fell")]),
         MatcherOutcome("gone", "gone", {}, None, [], [Failure("unavailable", "no module", "pip install it")]),
         MatcherOutcome("raising", "raising", {}, trials(rng, 1.0, 1.0, raising=True), [slam("raising")]),
@@ -102,15 +102,25 @@ def full() -> Comparison:
     )
 
 
-@pytest.fixture(scope="module")
-def folder(full: Comparison, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("report")
+def write_full(found: Comparison, out: Path) -> Path:
+    """Its page, with a map."""
     odds = np.zeros((80, 200), dtype=np.float32)
     odds[10:70, 10:190], odds[10, 10:190] = -2.0, 2.0
     (out / "runs" / "good").mkdir(parents=True)
     write_rosmap(out / "runs" / "good" / "map", OccupancyGrid(np.array([-10.0, -4.0]), 0.1, odds))
-    Study([full]).save(out)
-    assert write_report(full, out) == out / "report.html"
+    Study([found]).save(out)
+    return write_report(found, out)
+
+
+@pytest.fixture(scope="module")
+def full() -> Comparison:
+    return full_comparison()
+
+
+@pytest.fixture(scope="module")
+def folder(full: Comparison, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("report")
+    assert write_full(full, out) == out / "report.html"
     return out
 
 
@@ -183,8 +193,8 @@ def test_the_markdown_names_pictures_that_exist_and_has_whole_tables(folder: Pat
     named = re.findall(r"!\[[^\]]*\]\(([^)]*)\)", text)
     assert len(named) == 11
     assert all((folder / name).is_file() for name in named)
-    tables = [block.splitlines() for block in text.split("\n\n") if block.startswith("| matcher")]
-    assert len(tables) == 5
+    tables = [block.splitlines() for block in text.split("\n\n") if block.startswith(("| matcher", "| pair"))]
+    assert len(tables) == 6
     for lines in tables:
         assert len({len(re.findall(r"(?<!\\)\|", line)) for line in lines}) == 1
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -147,16 +147,15 @@ def study_of_runs(
                 found = _other(read_trajectory(source.path, truth(of_place[0]).odometry), truth(of_place[0]))
                 _add(rows, label, MatcherOutcome(label, label, {}, None, [found]))
         shown = [run for run in runs if _place(run.dataset) == place]
-        seeds = max(len(row.runs) for row in rows.values())
         comparisons.append(
             Comparison(
                 dataset=truth(of_place[0]).record,
-                config={"run_trials": False, "run_slam": True, "seeds": seeds},
+                config={"run_trials": False, "run_slam": True},
                 command=command,
                 created=datetime.now().astimezone().isoformat(timespec="seconds"),
                 environment=shown[0].environment if shown else environment(),
                 matchers=list(rows.values()),
-                notes=_notes(shown, bool(trajectories) and number == 0),
+                notes=_notes(shown, rows, bool(trajectories) and number == 0),
             )
         )
     return Study(comparisons)
@@ -303,7 +302,7 @@ def _json(path: Path) -> dict[str, Any]:
     return data
 
 
-def _notes(runs: Sequence[_Run], others: bool) -> list[str]:
+def _notes(runs: Sequence[_Run], rows: Mapping[str, MatcherOutcome], others: bool) -> list[str]:
     """On what terms these runs can be compared, and on which not."""
     shared = [{**run.header.config, "seed": 0, "matcher": None} for run in runs]
     told = []
@@ -321,6 +320,14 @@ def _notes(runs: Sequence[_Run], others: bool) -> list[str]:
                 + "; ".join(sorted(f"{cpu}, hsslam {version}" for cpu, version in machines))
                 + ")."
             )
+    seeds = {
+        label: sorted({run.seed for run in row.runs if run.seed is not None}) for label, row in rows.items()
+    }
+    if len({tuple(of) for of in seeds.values() if of}) > 1:
+        listed = "; ".join(f"{label}: {', '.join(map(str, of))}" for label, of in seeds.items() if of)
+        told.append(
+            f"The rows have different seeds ({listed}): of a simulated log, every seed is another one."
+        )
     if runs:
         told.append("Times are those of the runs' own folders; a run's first includes compiling.")
     if others:

@@ -144,8 +144,8 @@ def place_text(comparison: Comparison) -> str:
     drawn = "aligned with the true trajectory (least squares)"
     if {run.reference_kind for run in runs} != {"truth"}:
         drawn = "over odometry alone, which is shown for comparison, not as truth: the log has no exact truth"
-    seeds = int(comparison.config.get("seeds", 1))
-    which = f" Drawn are the runs with seed {runs[0].seed}." if runs and seeds > 1 else ""
+    several = any(len(matcher.runs) > 1 for matcher in comparison.matchers)
+    which = " Drawn is each matcher's first run." if several else ""
     return (
         f"Left, the trajectory {drawn}; green: loops accepted, red: loops tried and rejected. Right, the map in the "
         f"run's own frame: black is occupied, white free, grey unknown. All at one scale.{which}"

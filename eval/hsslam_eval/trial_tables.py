@@ -178,7 +178,7 @@ def _duel(duel: Duel) -> list[Cell]:
     test, scale = duel.test, _UNITS[duel.measure][1]
     effect = f"{test.wins} : {test.losses}" if duel.measure == "success" else f"r = {test.effect:+.2f}"
     shown = number(test.difference, scale)
-    if not float(shown):
+    if not shown.strip("-0."):
         shown = "0"
     elif test.difference > 0.0:
         shown = f"+{shown}"
