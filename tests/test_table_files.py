@@ -47,7 +47,7 @@ def test_latex_is_booktabs_with_whole_rows() -> None:
     for line in rows:
         spanned = 2 if r"\multicolumn{3}" in line else 0
         assert len(re.findall(r"(?<!\\)&", line)) + spanned == 3
-    assert r"\textbf{12.3}" in text and r"hide\_2" in text and r"Demo \& more" in text
+    assert r"\textbf{12.3 $\star$}" in text and r"hide\_2" in text and r"Demo \& more" in text
     assert r"\#1, 100 \% \{sure\}" in text
 
 

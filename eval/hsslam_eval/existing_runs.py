@@ -329,7 +329,10 @@ def _notes(runs: Sequence[_Run], rows: Mapping[str, MatcherOutcome], others: boo
             f"The rows have different seeds ({listed}): of a simulated log, every seed is another one."
         )
     if runs:
-        told.append("Times are those of the runs' own folders; a run's first includes compiling.")
+        told.append(
+            "Times are those in the runs' own folders: `hsslam run` counts compiling, where there was any, "
+            "`hsslam compare` does not."
+        )
     if others:
         told.append(
             "Trajectories given as files are judged by the same metric; scans that they lack are filled in with "

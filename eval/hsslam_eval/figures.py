@@ -183,6 +183,8 @@ def place_pictures(comparison: Comparison, prefix: str, folder: Path) -> list[Pi
                 f"{label}: trajectory over {_reference(run.reference_kind)}{_astray(run.path, limits)}"
                 f"{'. ' + came_to if came_to else ''}.",
                 map_plots.trajectory(label, run, looks[label], limits),
+                # As lines, thousands of loops would make the page many times as large.
+                shown="png",
             )
         )
         if label in maps:

@@ -31,22 +31,19 @@ def trajectory(label: str, slam: SlamOutcome, look: Style, limits: Limits) -> Fi
     pattern: Any = "-" if slam.reference_kind == "truth" else (0, (2, 2))
     axes.plot(reference[:, 0], reference[:, 1], color="#b0b0b0", linewidth=3.0, linestyle=pattern, label=name)
     axes.plot(path[:, 0], path[:, 1], color=look.colour, linewidth=1.1, label=label)
-    for accepted, colour, width in ((False, _REJECTED, 0.6), (True, _ACCEPTED, 0.6)):
+    # Thousands of loops would hide the rest: the more there are, the thinner.
+    width = float(np.clip(12.0 / math.sqrt(max(len(slam.loops), 1)), 0.2, 0.8))
+    for accepted, colour in ((False, _REJECTED), (True, _ACCEPTED)):
         loops = [(loop.first, loop.second) for loop in slam.loops if loop.accepted is accepted]
         if loops:
-            axes.add_collection(LineCollection(loops, colors=colour, linewidths=width, alpha=0.7, zorder=3.0))
-            # A loop that closes well joins two places on one another: a dot shows it where a line would not.
-            ends = np.array([second for _, second in loops])
-            axes.plot(ends[:, 0], ends[:, 1], ".", color=colour, markersize=3 if accepted else 2, zorder=3.0)
+            axes.add_collection(LineCollection(loops, colors=colour, linewidths=width, zorder=1.5))
     if len(path):
         axes.plot(*path[0], marker="o", color="black", markersize=5, linestyle="none", label="start")
     _metres(axes, limits)
     for accepted, colour, name in ((True, _ACCEPTED, "accepted"), (False, _REJECTED, "rejected")):
         count = sum(loop.accepted is accepted for loop in slam.loops)
         if slam.loops:
-            axes.add_line(
-                Line2D([], [], color=colour, marker=".", linewidth=1.2, label=f"loop {name} ({count})")
-            )
+            axes.add_line(Line2D([], [], color=colour, linewidth=1.2, label=f"loop {name} ({count})"))
     legend_below(figure, axes, 2)
     return figure
 

@@ -163,10 +163,11 @@ def _content(study: Study, parts: Sequence[Part]) -> dict[str, Any]:
     first = study.comparisons[0]
     version = str(first.environment.get("hsslam", ""))
     labels = {matcher.label for comparison in study.comparisons for matcher in comparison.matchers}
+    thing = "system" if any(comparison.notes for comparison in study.comparisons) else "matcher"
     names = " and ".join(part.name for part in parts)
     return {
         "version": version,
-        "title": f"{names}: {count(len(labels), 'matcher')} compared",
+        "title": f"{names}: {count(len(labels), thing)} compared",
         "subtitle": f"Made by hsslam {version}, {first.created.replace('T', ' ')}.",
         "attributions": list(
             dict.fromkeys(c.dataset.attribution for c in study.comparisons if c.dataset.attribution)

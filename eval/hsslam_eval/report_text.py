@@ -90,18 +90,14 @@ def contestants_table(study: Study) -> Table | None:
         for matcher in comparison.matchers:
             if not matcher.parameters:
                 continue
-            budget = matcher.parameters.get("evaluations")
             spent = matcher.trials.evaluations_mean if matcher.trials is not None else 0.0
-            given = ", ".join(
-                f"{key} {value}" for key, value in matcher.parameters.items() if key != "evaluations"
-            )
+            given = ", ".join(f"{key} {value}" for key, value in matcher.parameters.items())
             rows.setdefault(
                 matcher.label,
                 Row(
                     matcher.label,
                     [
                         Cell(matcher.name),
-                        Cell(number(float("nan")) if budget is None else str(budget)),
                         Cell(number(spent or float("nan")).removesuffix(".0")),
                         Cell(given),
                     ],
@@ -112,9 +108,9 @@ def contestants_table(study: Study) -> Table | None:
     return Table(
         "contestants",
         "Who competed",
-        "Every setting of each matcher. Evaluations: the budget that is set, and the mean that a match used; a dash "
-        "where a matcher has no budget or does not count.",
-        ["matcher", "evaluations set", "used", "settings"],
+        "Every setting of each matcher, and the mean number of fitness evaluations or iterations of a trial; a dash "
+        "where it does not count them.",
+        ["matcher", "evaluations per match", "settings"],
         list(rows.values()),
         "name",
     )

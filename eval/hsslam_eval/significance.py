@@ -81,6 +81,14 @@ def winners(found: list[Duel]) -> Mapping[Measure, str]:
     return out
 
 
+def unbeaten(found: list[Duel], measure: Measure) -> list[str]:
+    """Labels than which no other matcher is significantly better by a measure."""
+    of_measure = [duel for duel in found if duel.measure == measure]
+    beaten = {duel.second if duel.better == duel.first else duel.first for duel in of_measure if duel.better}
+    labels = dict.fromkeys(name for duel in of_measure for name in (duel.first, duel.second))
+    return [label for label in labels if label not in beaten]
+
+
 def succeeded(trials: MatcherTrials) -> NDArray[np.bool_]:
     """Which trials succeeded by the first definition, (T,)."""
     definition, data = trials.successes[0], trials.data

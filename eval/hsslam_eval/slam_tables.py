@@ -46,9 +46,14 @@ def slam_tables(comparison: Comparison) -> list[Table]:
         Table(
             "slam-cost",
             "Cost and loops",
-            "Runs one after the other, each in a process of its own. Wall time is from the first scan read to the last "
-            "pose, compilation excluded; the real-time factor is seconds driven per second computed. Peak memory is "
-            "the process's, interpreter and libraries included."
+            # Of runs that were there already the report's notes say on what terms they were made.
+            (
+                ""
+                if comparison.notes
+                else "Runs one after the other, each in a process of its own, compilation excluded. "
+            )
+            + "Wall time is from the first scan read to the last pose; the real-time factor is seconds driven per "
+            "second computed. Peak memory is the process's, interpreter and libraries included."
             + (" Means over the seeds, ± standard deviation." if seeds > 1 else ""),
             ["runs", *(heading for heading, _ in _COST)],
             [
@@ -187,7 +192,7 @@ def _mean_std(many: Sequence[Accuracy], name: str, unit: str, digits: int) -> Ce
     between = float(mean.std(ddof=1)) if len(mean) > 1 else math.nan
     return Cell(
         f"{mean.mean():.{digits}f} ± {std.mean():.{digits}f}",
-        f"seeds ± {between:.{digits}f}" if len(mean) > 1 else "",
+        f"seeds ± {number(between)}" if len(mean) > 1 else "",
         numbers=(float(mean.mean()), float(std.mean()), *([between] if len(mean) > 1 else [])),
     )
 

@@ -38,10 +38,14 @@ def to_csv(table: Table) -> str:
     """
     widths = [_width(table.rows, place) for place in range(len(table.headings))]
     headings = [table.corner]
+    before = ""
     for heading, width in zip(table.headings, widths, strict=True):
         heading = heading.replace("\N{NO-BREAK SPACE}", " ")
-        endings = {3: ("", " low", " high"), 2: ("", " spread")}.get(width, ("",))
-        headings += [heading + ending for ending in endings]
+        # A heading that comes again belongs to the column before it.
+        name = f"{before}: {heading}" if table.headings.count(heading) > 1 else heading
+        endings = {3: ("", " low", " high"), 2: ("", f" {table.second}")}.get(width, ("",))
+        headings += [name + ending for ending in endings]
+        before = heading
     out = StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow([*headings, "note"])
@@ -64,15 +68,17 @@ def to_latex(table: Table, label: str) -> str:
         rf"\label{{tab:{label}}}",
         rf"\begin{{tabular}}{{l{'r' * columns}}}",
         r"\toprule",
-        " & ".join(_escape(heading) for heading in (table.corner, *table.headings)) + r" \\",
+        " & ".join(_heading(heading) for heading in (table.corner, *table.headings)) + r" \\",
         r"\midrule",
     ]
     for row in table.rows:
         if row.note:
             lines.append(rf"{_escape(row.label)} & \multicolumn{{{columns}}}{{l}}{{{_escape(row.note)}}} \\")
             continue
+        # The sign beside bold, since the caption speaks of it.
         texts = [
-            rf"\textbf{{{_escape(cell.text)}}}" if cell.best else _escape(cell.text) for cell in row.cells
+            rf"\textbf{{{_escape(cell.text + table.mark)}}}" if cell.best else _escape(cell.text)
+            for cell in row.cells
         ]
         lines.append(" & ".join([_escape(row.label), *texts]) + r" \\")
         if any(cell.interval for cell in row.cells):
@@ -81,6 +87,13 @@ def to_latex(table: Table, label: str) -> str:
             ]
             lines.append(" & ".join(["", *small]) + r" \\")
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", r"\end{table}", ""])
+
+
+def _heading(text: str) -> str:
+    """A heading whose unit is on a line of its own, or the table would not fit a page."""
+    lines = [_escape(line) for line in re.split(r" (?=\()|(?<=\)) ", text) if line]
+    stacked = r" \\ ".join(lines)
+    return rf"\shortstack[r]{{{stacked}}}" if len(lines) > 1 else stacked
 
 
 def _width(rows: list[Row], place: int) -> int:

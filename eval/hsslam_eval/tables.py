@@ -44,7 +44,8 @@ class Row:
 class Table:
     """A titled table; headings carry the units, ``name`` is the stem of its files.
 
-    ``mark`` follows what is best: a sign that print and plain text keep.
+    ``mark`` follows what is best: a sign that print and plain text keep. ``second`` says what the second number of a
+    cell with two is.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Table:
     rows: list[Row]
     corner: str = "matcher"
     mark: str = " ★"
+    second: str = "spread"
 
 
 def number(value: float, scale: float = 1.0) -> str:

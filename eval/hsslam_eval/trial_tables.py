@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from hsslam_eval.comparison import Comparison, MatcherTrials
-from hsslam_eval.significance import MEASURES, Duel, Measure, duels, winners
+from hsslam_eval.significance import MEASURES, Duel, Measure, duels, unbeaten, winners
 from hsslam_eval.tables import Cell, Row, Table, limit_text, measured, missing, number, spread
 
 _ERRORS = ["displacement mean (cm)", "displacement median (cm)", "rotation mean (°)", "rotation median (°)"]
@@ -80,22 +80,26 @@ def verdict(comparison: Comparison) -> str:
         return ""
     best, level = winners(found), found[0].level
     what: dict[Measure, tuple[str, str]] = {
-        "success": ("succeeds more often than every other matcher", "succeeds more often than every other"),
-        "displacement": (
-            "has smaller displacement errors than every other matcher",
-            "has smaller displacement errors than every other",
-        ),
-        "rotation": (
-            "has smaller rotation errors than every other matcher",
-            "has smaller rotation errors than every other",
-        ),
-        "time": ("is faster than every other matcher", "is faster than every other"),
+        "success": ("succeeds more often than every other matcher", "success"),
+        "displacement": ("has smaller displacement errors than every other matcher", "displacement error"),
+        "rotation": ("has smaller rotation errors than every other matcher", "rotation error"),
+        "time": ("is faster than every other matcher", "time"),
     }
-    parts = [
-        f"{best[measure]} {what[measure][0]}." if measure in best else f"No matcher {what[measure][1]}."
-        for measure in MEASURES
-    ]
+    parts = []
+    for measure in MEASURES:
+        claim, name = what[measure]
+        if measure in best:
+            parts.append(f"{best[measure]} {claim}.")
+        else:
+            first = unbeaten(found, measure)
+            parts.append(
+                f"No single best in {name}: {_listed(first)} {'are' if len(first) > 1 else 'is'} beaten by none."
+            )
     return f"{' '.join(parts)} (Paired tests, corrected p < {level:.2g}.)"
+
+
+def _listed(labels: Sequence[str]) -> str:
+    return " and ".join(filter(None, [", ".join(labels[:-1]), labels[-1]])) if labels else "nobody"
 
 
 def _success_cells(trials: MatcherTrials, label: str, best: Mapping[Measure, str]) -> list[Cell]:
@@ -171,6 +175,7 @@ def _pairs(found: list[Duel], limit: str) -> Table:
         rows,
         "pair",
         mark="",
+        second="effect",
     )
 
 
