@@ -7,6 +7,7 @@ import csv
 import json
 import math
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from hsslam_eval.comparison import (
 )
 from hsslam_eval.outcomes import trials_record
 from hsslam_eval.report import write_report
+from hsslam_eval.slam_tables import slam_tables
 from hsslam_eval.tables import number
 from hsslam_eval.trial_tables import trial_tables, verdict
 from hsslam_eval.trials import TrialConfig, TrialResult
@@ -266,6 +268,31 @@ def test_same_comparison_same_bytes(full: Comparison, folder: Path, tmp_path: Pa
     (tmp_path / "runs").symlink_to(folder / "runs")
     write_report(full, tmp_path)
     assert (tmp_path / "report.html").read_bytes() == (folder / "report.html").read_bytes()
+
+
+def seeded(label: str, errors: list[float]) -> MatcherOutcome:
+    runs = []
+    for seed, error in enumerate(errors):
+        ate = {"translation_rmse_m": error, "rotation_rmse_deg": 0.1, "count": 50.0}
+        runs.append(replace(slam(label), accuracy=Accuracy(ate=ate), seed=seed))
+    return MatcherOutcome(label, label, {}, None, runs)
+
+
+def marked(found: Comparison) -> list[str]:
+    table = next(table for table in slam_tables(found) if table.name == "slam-accuracy")
+    return [row.label for row in table.rows if any(cell.best for cell in row.cells)]
+
+
+def test_slam_has_a_winner_only_over_enough_logs() -> None:
+    rng = np.random.default_rng(2)
+    good, bad = rng.uniform(0.01, 0.02, 8).tolist(), rng.uniform(0.03, 0.04, 8).tolist()
+    found = comparison(seeded("bad", bad), seeded("good", good))
+    assert marked(found) == ["good"]
+    assert marked(comparison(seeded("bad", bad[:5]), seeded("good", good[:5]))) == []
+    assert marked(comparison(seeded("one", good), seeded("same", good))) == []
+    # Seeds of a recorded log are the same drive over and over.
+    real = replace(found, dataset=replace(found.dataset, kind="real"))
+    assert marked(real) == []
 
 
 def test_a_winner_is_named_only_where_the_tests_say_so() -> None:

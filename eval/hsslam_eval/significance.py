@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hsslam_eval.comparison import Comparison, MatcherTrials
+from hsslam_eval.comparison import Comparison, MatcherTrials, SlamOutcome
 from hsslam_eval.paired_tests import PairedTest, holm, mcnemar, signed_rank
 
 Measure = Literal["success", "displacement", "rotation", "time"]
@@ -57,7 +57,7 @@ def duels(comparison: Comparison) -> list[Duel]:
     trials = {m.label: m.trials for m in comparison.matchers if m.trials is not None}
     if len(trials) < 2:
         return []
-    level = 1.0 - float(comparison.config["trials"]["confidence"])
+    level = _level(comparison)
     made = [
         (one, other, measure, _test(trials[one], trials[other], measure))
         for one, other in combinations(trials, 2)
@@ -79,6 +79,55 @@ def winners(found: list[Duel]) -> Mapping[Measure, str]:
             if all(duel.better == label for duel in of_measure if label in (duel.first, duel.second)):
                 out[measure] = label
     return out
+
+
+def slam_winner(comparison: Comparison) -> tuple[str, str]:
+    """Matcher whose SLAM error is significantly smaller than that of every other one, and what was tested, in words.
+
+    The runs of a simulated log are paired by seed, each seed being another log. On a recorded log seeds repeat the
+    same drive: they show the matcher's own randomness, and no test can make more of them.
+    """
+    rows = {
+        m.label: {r.seed: e for r in m.runs if (e := slam_error(r)) is not None} for m in comparison.matchers
+    }
+    rows = {label: errors for label, errors in rows.items() if errors}
+    level = _level(comparison)
+    pairs = list(combinations(rows, 2))
+    seeds = min((len(rows[one].keys() & rows[other].keys()) for one, other in pairs), default=0)
+    if comparison.dataset.kind != "simulated":
+        return (
+            "",
+            "No winner is marked: seeds repeat the same drive, they show the matcher's own randomness only.",
+        )
+    if not pairs or len(pairs) * 2.0 ** (1 - seeds) >= level:
+        return "", "No winner is marked: with so few runs no paired test can be significant."
+    tests = []
+    for one, other in pairs:
+        shared = sorted(rows[one].keys() & rows[other].keys(), key=str)
+        tests.append(signed_rank([rows[one][s] for s in shared], [rows[other][s] for s in shared]))
+    better: dict[str, int] = dict.fromkeys(rows, 0)
+    for (one, other), test, p in zip(pairs, tests, holm([test.p for test in tests]), strict=True):
+        if p < level and test.effect:
+            better[one if test.effect < 0.0 else other] += 1
+    winner = next((label for label, wins in better.items() if wins == len(rows) - 1), "")
+    return winner, (
+        f"★: a smaller error than every other matcher by Wilcoxon's signed rank test, paired by seed, Holm's "
+        f"correction over {len(pairs)} tests, p < {level:.2g}."
+        if winner
+        else "No winner is marked: none is significantly better than every other (signed rank test, paired by seed)."
+    )
+
+
+def slam_error(run: SlamOutcome) -> float | None:
+    """The error that runs are ranked by (m): of the relations where there are some, else the absolute one."""
+    if run.accuracy.relations is not None:
+        return run.accuracy.relations["translation_mean_m"]
+    return run.accuracy.ate["translation_rmse_m"] if run.accuracy.ate is not None else None
+
+
+def _level(comparison: Comparison) -> float:
+    trials = comparison.config.get("trials", {})
+    return 1.0 - float(trials.get("confidence", 0.95))
 
 
 def unbeaten(found: list[Duel], measure: Measure) -> list[str]:

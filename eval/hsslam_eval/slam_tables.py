@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from hsslam_eval.comparison import Accuracy, Comparison, SlamOutcome
+from hsslam_eval.significance import slam_winner
 from hsslam_eval.tables import Cell, Row, Table, missing, number, over_seeds
 
 Runs = Sequence[SlamOutcome]
@@ -22,7 +24,13 @@ def slam_tables(comparison: Comparison) -> list[Table]:
     accuracy = _accuracy_columns(done)
     tables = []
     if accuracy:
-        rows = _rows(comparison, accuracy)
+        winner, tested = slam_winner(comparison)
+        rows = [
+            replace(row, cells=[row.cells[0], replace(row.cells[1], best=True), *row.cells[2:]])
+            if row.label == winner
+            else row
+            for row in _rows(comparison, accuracy)
+        ]
         longest = max(comparison.matchers, key=lambda matcher: len(matcher.runs)).runs
         rows.append(
             Row(
@@ -37,7 +45,7 @@ def slam_tables(comparison: Comparison) -> list[Table]:
             Table(
                 "slam-accuracy",
                 "Accuracy",
-                f"{_accuracy_explanation(done)} {_seeds_explanation(comparison, seeds)}",
+                f"{_accuracy_explanation(done)} {_seeds_explanation(comparison, seeds, tested)}",
                 ["runs", *(heading for heading, _ in accuracy)],
                 rows,
             )
@@ -213,15 +221,8 @@ def _accuracy_explanation(done: Runs) -> str:
     return " ".join(parts)
 
 
-def _seeds_explanation(comparison: Comparison, seeds: int) -> str:
+def _seeds_explanation(comparison: Comparison, seeds: int, tested: str) -> str:
     if seeds < 2:
         return "One run each, so no intervals, and no winner is marked."
-    varies = (
-        "every seed is another simulation of the log"
-        if comparison.dataset.kind == "simulated"
-        else "the log is the same, so they show the matcher's own randomness only"
-    )
-    return (
-        f"Means over {seeds} seeds, ± standard deviation between them; {varies}. No winner is marked: so few runs "
-        "carry no test."
-    )
+    varies = "; every seed is another simulation of the log" if comparison.dataset.kind == "simulated" else ""
+    return f"Means over {seeds} seeds, ± standard deviation between them{varies}. {tested}"
