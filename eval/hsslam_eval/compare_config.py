@@ -76,9 +76,7 @@ class CompareConfig(Section):
     seed: int = Field(
         default=0, ge=0, description="of trials and SLAM alike: every random choice follows from it"
     )
-    seeds: int = Field(
-        default=1, ge=1, description="how often everything is run: with seed, seed + 1, ..."
-    )
+    seeds: int = Field(default=1, ge=1, description="how often everything is run: with seed, seed + 1, ...")
     run_trials: bool = Field(default=True, description="whether to run trials")
     run_slam: bool = Field(default=True, description="whether to run SLAM")
     trials: TrialConfig = Field(default_factory=TrialConfig, description="the same trials for every matcher")

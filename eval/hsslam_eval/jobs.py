@@ -192,7 +192,9 @@ def run_job(
         if listener is not None:
             listener(*last)
 
-    reason = supervise("hsslam_eval.worker", [str(folder)], folder / LOG_FILE, limits or LimitSection(), listen)
+    reason = supervise(
+        "hsslam_eval.worker", [str(folder)], folder / LOG_FILE, limits or LimitSection(), listen
+    )
     found = result_of(job, folder)
     if found is not None:
         return found  # complete, whatever the process did afterwards

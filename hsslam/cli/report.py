@@ -46,8 +46,9 @@ def report(
     """
     from hsslam_eval.compare_config import DatasetSpec
     from hsslam_eval.comparison import COMPARISON_FILE, Study
-    from hsslam_eval.existing_runs import Source, study_of_runs
+    from hsslam_eval.existing_runs import study_of_runs
     from hsslam_eval.report import write_report
+    from hsslam_eval.run_outcomes import Source
 
     comparison = Path(runs[0]) if (Path(runs[0]) / COMPARISON_FILE).is_file() else None
     if comparison is not None and (len(runs) > 1 or out is not None):

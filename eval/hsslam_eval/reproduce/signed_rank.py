@@ -6,7 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from hsslam_eval import paired_tests
+from hsslam_eval.paired_tests import holm
 
 LEVEL = 0.05
 """Differences with a corrected p under this count."""
@@ -44,24 +47,8 @@ def signed_rank(first: ArrayLike, second: ArrayLike) -> tuple[float, int]:
 
     Pairs without a difference are dropped (Wilcoxon's way); without any other, p is 1.
     """
-    from scipy.stats import rankdata, wilcoxon
-
-    differences = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
-    differences = differences[differences != 0.0]
-    if differences.size == 0:
-        return 1.0, 0
-    total = float(np.sum(np.sign(differences) * rankdata(np.abs(differences))))
-    return float(wilcoxon(differences).pvalue), int(np.sign(total))
-
-
-def holm(p: ArrayLike) -> NDArray[np.float64]:
-    """Holm's step-down correction (Scandinavian Journal of Statistics 6, 1979) of a family's p values (T,)."""
-    values = np.asarray(p, dtype=np.float64)
-    order = np.argsort(values, kind="stable")
-    scaled = values[order] * np.arange(len(values), 0, -1)
-    corrected = np.empty_like(values)
-    corrected[order] = np.minimum(np.maximum.accumulate(scaled), 1.0)
-    return corrected
+    found = paired_tests.signed_rank(first, second)
+    return found.p, int(np.sign(found.effect))
 
 
 def compare_all(pairs: Sequence[tuple[ArrayLike, ArrayLike]]) -> list[Comparison]:
