@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Literal
 
 from hsslam.errors import DataError
+from hsslam.io import readers
 from hsslam.io.log_statistics import LogStatistics
 from hsslam.scan import LaserScan
 
@@ -80,6 +81,8 @@ def by_suffix(name: str) -> LogFormat | None:
 
 def log_stem(name: str) -> str:
     """Strip a log's file name of the suffix of its format, and of what packs it."""
+    if (reader := readers.reader_of(Path(name))) is not None:
+        return readers.stem(Path(name), reader)
     for log in FORMATS.values():
         for suffix in log.suffixes:
             for packed in PACKED if log.packed else ("",):
@@ -104,6 +107,8 @@ def detect(path: Path | str) -> LogFormat:
     path = Path(path)
     if not path.exists():
         raise DataError(f"{path}: no such file")
+    if (reader := readers.reader_of(path)) is not None:
+        return LogFormat(reader.name, reader.title, reader.suffixes, writable=False)
     if path.is_dir():
         return FORMATS[_bag_in_folder(path)]
     try:
@@ -146,6 +151,8 @@ def read_log(
         As the format's own reader does.
     """
     path, options = Path(path), options or LogOptions()
+    if (reader := readers.reader_of(path)) is not None:
+        return readers.read_with(reader, path)
     name = detect(path).name
     if name == "npz":
         from hsslam.io.range_table import read_range_npz
