@@ -90,12 +90,18 @@ class TrackerSection(Section):
     """Front end: every scan against the local submap."""
 
     window: WindowSection = WindowSection(half_x=0.2, half_y=0.2, half_theta_deg=10.0)
-    min_score: float = Field(0.5, ge=0.0, le=1.0, description="below this score odometry is trusted instead")
+    min_score: float = Field(
+        default=0.5, ge=0.0, le=1.0, description="below this score odometry is trusted instead"
+    )
     recovery_score: float = Field(
-        0.75, ge=0.0, le=1.0, description="below this score odometry is doubted and a wide window searched"
+        default=0.75,
+        ge=0.0,
+        le=1.0,
+        description="below this score odometry is doubted and a wide window searched",
     )
     fuse_odometry: bool = Field(
-        True, description="weigh the match and odometry's prediction by their covariances (a Kalman update)"
+        default=True,
+        description="weigh the match and odometry's prediction by their covariances (a Kalman update)",
     )
     recovery_window: WindowSection = WindowSection(half_x=0.75, half_y=0.75, half_theta_deg=60.0)
 
@@ -103,40 +109,44 @@ class TrackerSection(Section):
 class KeyframeSection(Section):
     """When a scan becomes a keyframe, and how many make a submap."""
 
-    distance: float = Field(0.3, gt=0.0, description="a keyframe after this much travel (m)")
-    angle_deg: float = Field(10.0, gt=0.0, description="or after this much turning (deg)")
+    distance: float = Field(default=0.3, gt=0.0, description="a keyframe after this much travel (m)")
+    angle_deg: float = Field(default=10.0, gt=0.0, description="or after this much turning (deg)")
     submap_size: int = Field(
-        30, ge=1, description="keyframes in a full local submap; half as many in a young one"
+        default=30, ge=1, description="keyframes in a full local submap; half as many in a young one"
     )
 
 
 class LoopSection(Section):
     """Loop closure: candidates near by, matched over a window as wide as the graph is unsure, verified."""
 
-    enabled: bool = Field(True, description="look for loops at all")
+    enabled: bool = Field(default=True, description="look for loops at all")
     radius: float = Field(
-        3.0,
+        default=3.0,
         gt=0.0,
         description="candidates within this distance of the estimate, and two of its standard deviations (m)",
     )
-    min_gap: int = Field(20, ge=1, description="keyframes between the two ends of a loop, at least")
-    submap_size: int = Field(12, ge=1, description="keyframes in the submap around a candidate")
-    every: int = Field(1, ge=1, description="look for a loop at every n-th keyframe")
-    candidates: int = Field(2, ge=1, description="candidates tried per keyframe, nearest first")
+    min_gap: int = Field(default=20, ge=1, description="keyframes between the two ends of a loop, at least")
+    submap_size: int = Field(default=12, ge=1, description="keyframes in the submap around a candidate")
+    every: int = Field(default=1, ge=1, description="look for a loop at every n-th keyframe")
+    candidates: int = Field(default=2, ge=1, description="candidates tried per keyframe, nearest first")
     window: WindowSection = WindowSection(half_x=1.0, half_y=1.0, half_theta_deg=20.0)
-    min_score: float = Field(0.6, ge=0.0, le=1.0, description="share of points a loop must explain")
-    max_std: float = Field(0.2, gt=0.0, description="largest standard deviation of an accepted loop (m)")
+    min_score: float = Field(default=0.6, ge=0.0, le=1.0, description="share of points a loop must explain")
+    max_std: float = Field(
+        default=0.2, gt=0.0, description="largest standard deviation of an accepted loop (m)"
+    )
     expected_std: float = Field(
-        0.15,
+        default=0.15,
         ge=0.0,
         description="a loop that the graph foresees this well (m) and that is where it is foreseen needs no others",
     )
     agreeing: int = Field(
-        2, ge=0, description="other loops that must agree with a loop that the graph does not foresee"
+        default=2, ge=0, description="other loops that must agree with a loop that the graph does not foresee"
     )
-    patience: int = Field(30, ge=1, description="keyframes that such a loop waits for others to agree")
+    patience: int = Field(
+        default=30, ge=1, description="keyframes that such a loop waits for others to agree"
+    )
     max_ambiguity: float = Field(
-        0.95,
+        default=0.95,
         gt=0.0,
         description="refuse it where an answer elsewhere scores more than this share of its own score",
     )
@@ -145,47 +155,61 @@ class LoopSection(Section):
 class GraphSection(Section):
     """Back end: the GTSAM pose graph."""
 
-    robust: Literal["cauchy", "gnc", "none"] = Field("cauchy", description="loss on loop factors at the end")
-    robust_scale: float = Field(1.0, gt=0.0, description="scale of the robust loss (standard deviations)")
+    robust: Literal["cauchy", "gnc", "none"] = Field(
+        default="cauchy", description="loss on loop factors at the end"
+    )
+    robust_scale: float = Field(
+        default=1.0, gt=0.0, description="scale of the robust loss (standard deviations)"
+    )
     odometry_std_xy: float = Field(
-        0.1, gt=0.0, description="standard deviation per metre where odometry stands in for a match (m/m)"
+        default=0.1,
+        gt=0.0,
+        description="standard deviation per metre where odometry stands in for a match (m/m)",
     )
     odometry_std_theta_deg: float = Field(
-        20.0, gt=0.0, description="its standard deviation of heading per radian turned or metre driven (deg)"
+        default=20.0,
+        gt=0.0,
+        description="its standard deviation of heading per radian turned or metre driven (deg)",
     )
     refine_rounds: int = Field(
-        1, ge=0, description="rounds of matching overlapping keyframes again at the end"
+        default=1, ge=0, description="rounds of matching overlapping keyframes again at the end"
     )
-    overlap_radius: float = Field(3.0, gt=0.0, description="keyframes within this distance may overlap (m)")
-    overlap_neighbours: int = Field(6, ge=1, description="overlapping keyframes matched with each, at most")
-    overlap_half_xy: float = Field(0.15, gt=0.0, description="half side of the window of such a match (m)")
-    overlap_half_theta_deg: float = Field(5.0, gt=0.0, description="half its extent in heading (deg)")
+    overlap_radius: float = Field(
+        default=3.0, gt=0.0, description="keyframes within this distance may overlap (m)"
+    )
+    overlap_neighbours: int = Field(
+        default=6, ge=1, description="overlapping keyframes matched with each, at most"
+    )
+    overlap_half_xy: float = Field(
+        default=0.15, gt=0.0, description="half side of the window of such a match (m)"
+    )
+    overlap_half_theta_deg: float = Field(default=5.0, gt=0.0, description="half its extent in heading (deg)")
     rescan_keyframes: int = Field(
-        18,
+        default=18,
         ge=0,
         description="keyframes every scan is matched against once more at the very end (0: not at all)",
     )
     overlap_min_score: float = Field(
-        0.35, ge=0.0, le=1.0, description="share of points such a match must explain"
+        default=0.35, ge=0.0, le=1.0, description="share of points such a match must explain"
     )
 
 
 class MapSection(Section):
     """The occupancy grid."""
 
-    resolution: float = Field(0.05, gt=0.0, description="side of a cell (m)")
-    max_range: float = Field(30.0, gt=0.0, description="beams are cut at this range (m)")
+    resolution: float = Field(default=0.05, gt=0.0, description="side of a cell (m)")
+    max_range: float = Field(default=30.0, gt=0.0, description="beams are cut at this range (m)")
 
 
 class Config(Section):
     """Everything that decides what a SLAM run does."""
 
-    seed: int = Field(0, ge=0, description="every random choice follows from it")
+    seed: int = Field(default=0, ge=0, description="every random choice follows from it")
     matcher: MatcherSection = Field(
         default_factory=lambda: MatcherSection(name="hide"), description="tracks every scan"
     )
     loop_matcher: MatcherSection | None = Field(
-        None, description="closes loops; the tracker's where left out"
+        default=None, description="closes loops; the tracker's where left out"
     )
     tracker: TrackerSection = TrackerSection()
     keyframes: KeyframeSection = KeyframeSection()

@@ -16,13 +16,14 @@ PROGRAM = """
 from pathlib import Path
 import numpy as np
 from pydantic import Field
-from hsslam.config import load_config
+from hsslam.config import Config, KeyframeSection, load_config
 from hsslam.datasets.catalogue import open_dataset
 from hsslam.matching import Estimate, Matcher, MatcherConfig, Points, Pose, Reference, SearchWindow, create
 from hsslam.matching.conformance import check_matcher, conformance_checks
 from hsslam.search import minimize
 from hsslam.slam.pipeline import Slam
 from hsslam_eval.compare import CompareConfig, DatasetSpec, compare
+from hsslam_plugins.hide import HideConfig
 
 class MineConfig(MatcherConfig):
     reach: float = Field(default=0.3, gt=0.0)
@@ -43,7 +44,9 @@ reveal_type(result.pose)
 reveal_type(result.score)
 check_matcher(Mine(MineConfig(reach=0.2)))
 reveal_type(conformance_checks()[0][0])
+slam = Slam(Config(seed=1, keyframes=KeyframeSection(distance=0.4)))
 slam = Slam(load_config(overrides=["matcher=hsl"]))
+print(HideConfig(memory_size=40))
 for event in slam.run(open_dataset("office").scans()):
     reveal_type(event)
 reveal_type(slam.result().trajectory.poses)

@@ -22,9 +22,9 @@ class Options(BaseModel):
 class HarmonyMemory(Options):
     """A harmony memory and how much of a harmony comes from it."""
 
-    memory_size: int = Field(30, ge=4, description="harmonies in the memory (HMS)")
+    memory_size: int = Field(default=30, ge=4, description="harmonies in the memory (HMS)")
     memory_considering_rate: float = Field(
-        0.88, ge=0.0, le=1.0, description="probability that a variable comes from the memory (HMCR)"
+        default=0.88, ge=0.0, le=1.0, description="probability that a variable comes from the memory (HMCR)"
     )
 
 
@@ -36,10 +36,13 @@ class Harmony(HarmonyMemory):
     """
 
     pitch_adjusting_rate: float = Field(
-        sum(PAPER_PITCH_ADJUSTING_RATES) / 2.0, ge=0.0, le=1.0, description="probability of adjustment (PAR)"
+        default=sum(PAPER_PITCH_ADJUSTING_RATES) / 2.0,
+        ge=0.0,
+        le=1.0,
+        description="probability of adjustment (PAR)",
     )
     bandwidth: float = Field(
-        (PAPER_BANDWIDTHS[0] * PAPER_BANDWIDTHS[1]) ** 0.5,
+        default=(PAPER_BANDWIDTHS[0] * PAPER_BANDWIDTHS[1]) ** 0.5,
         gt=0.0,
         description="largest pitch adjustment, as a share of the variable's range (BW)",
     )
@@ -53,16 +56,16 @@ class ImprovedHarmony(HarmonyMemory):
     """
 
     pitch_adjusting_rate_min: float = Field(
-        PAPER_PITCH_ADJUSTING_RATES[0], ge=0.0, le=1.0, description="PAR at the start (PAR_min)"
+        default=PAPER_PITCH_ADJUSTING_RATES[0], ge=0.0, le=1.0, description="PAR at the start (PAR_min)"
     )
     pitch_adjusting_rate_max: float = Field(
-        PAPER_PITCH_ADJUSTING_RATES[1], ge=0.0, le=1.0, description="PAR at the end (PAR_max)"
+        default=PAPER_PITCH_ADJUSTING_RATES[1], ge=0.0, le=1.0, description="PAR at the end (PAR_max)"
     )
     bandwidth_min: float = Field(
-        PAPER_BANDWIDTHS[0], gt=0.0, description="BW at the end, as a share of the range (BW_min)"
+        default=PAPER_BANDWIDTHS[0], gt=0.0, description="BW at the end, as a share of the range (BW_min)"
     )
     bandwidth_max: float = Field(
-        PAPER_BANDWIDTHS[1], gt=0.0, description="BW at the start, as a share of the range (BW_max)"
+        default=PAPER_BANDWIDTHS[1], gt=0.0, description="BW at the start, as a share of the range (BW_max)"
     )
 
     @model_validator(mode="after")
@@ -78,10 +81,15 @@ class Evolution(Options):
     The paper prints F for HIDE alone, and no crossover rate at all: the usual 0.9 stands in.
     """
 
-    population_size: int = Field(30, ge=4, description="members; as many as the paper's HMS")
-    weight: float = Field(0.44, ge=0.0, le=2.0, description="weight of the difference of two members (F)")
+    population_size: int = Field(default=30, ge=4, description="members; as many as the paper's HMS")
+    weight: float = Field(
+        default=0.44, ge=0.0, le=2.0, description="weight of the difference of two members (F)"
+    )
     crossover_rate: float = Field(
-        0.9, ge=0.0, le=1.0, description="share of variables taken from the mutant (the paper gives none)"
+        default=0.9,
+        ge=0.0,
+        le=1.0,
+        description="share of variables taken from the mutant (the paper gives none)",
     )
 
 
@@ -92,23 +100,34 @@ class SimpleEvolution(Evolution):
     box lies, which would find minima at the origin for a wrong reason; with 1 the scheme is DE/current/1.
     """
 
-    base_factor: float = Field(1.0, description="what the target is multiplied by (L)")
+    base_factor: float = Field(default=1.0, description="what the target is multiplied by (L)")
 
 
 class BestEvolution(Evolution):
     """DE/rand-to-best/1 (equation 12)."""
 
-    attraction: float = Field(0.7, ge=0.0, le=2.0, description="pull towards the best member (lambda)")
+    attraction: float = Field(
+        default=0.7, ge=0.0, le=2.0, description="pull towards the best member (lambda)"
+    )
 
 
 class Hide(ImprovedHarmony):
     """HIDE: ``harmony_run`` improvisations, then equation 12 on every harmony, and so on (paper, section 5.2)."""
 
-    harmony_run: int = Field(14, ge=0, description="improvisations between two differential steps (HRT)")
-    attraction: float = Field(0.7, ge=0.0, le=2.0, description="pull towards the best harmony (lambda)")
-    weight: float = Field(0.44, ge=0.0, le=2.0, description="weight of the difference of two harmonies (F)")
+    harmony_run: int = Field(
+        default=14, ge=0, description="improvisations between two differential steps (HRT)"
+    )
+    attraction: float = Field(
+        default=0.7, ge=0.0, le=2.0, description="pull towards the best harmony (lambda)"
+    )
+    weight: float = Field(
+        default=0.44, ge=0.0, le=2.0, description="weight of the difference of two harmonies (F)"
+    )
     crossover_rate: float = Field(
-        0.9, ge=0.0, le=1.0, description="share of variables taken from the mutant (the paper gives none)"
+        default=0.9,
+        ge=0.0,
+        le=1.0,
+        description="share of variables taken from the mutant (the paper gives none)",
     )
 
 
@@ -120,14 +139,16 @@ class Genetic(Options):
     of a child moves by a Gaussian. GLASM's authors have 9 bits and give no selection.
     """
 
-    population_size: int = Field(120, ge=2, description="chromosomes in a generation")
+    population_size: int = Field(default=120, ge=2, description="chromosomes in a generation")
     encoding: Literal["gray", "real"] = Field(
-        "gray", description="Gray-coded bits, or the numbers themselves"
+        default="gray", description="Gray-coded bits, or the numbers themselves"
     )
-    bits: int = Field(16, ge=2, le=48, description="`gray`: bits of a variable")
-    crossover_rate: float = Field(1.0, ge=0.0, le=1.0, description="probability that a child has two parents")
-    mutation_rate: float = Field(0.12, ge=0.0, le=1.0, description="probability that a child mutates")
+    bits: int = Field(default=16, ge=2, le=48, description="`gray`: bits of a variable")
+    crossover_rate: float = Field(
+        default=1.0, ge=0.0, le=1.0, description="probability that a child has two parents"
+    )
+    mutation_rate: float = Field(default=0.12, ge=0.0, le=1.0, description="probability that a child mutates")
     mutation_scale: float = Field(
-        0.1, gt=0.0, description="`real`: standard deviation of a mutation, as a share of the range"
+        default=0.1, gt=0.0, description="`real`: standard deviation of a mutation, as a share of the range"
     )
-    tournament: int = Field(3, ge=1, description="contestants for each parent")
+    tournament: int = Field(default=3, ge=1, description="contestants for each parent")

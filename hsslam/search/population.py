@@ -25,20 +25,24 @@ class PopulationConfig(MatcherConfig):
     """Parameters of the fitness and the refinement."""
 
     fitness: FitnessName = Field(
-        "surface",
+        default="surface",
         description="`paper`: squares around the points; `surface`: squares along the segments between them; "
         "`likelihood`: a smooth field around these",
     )
-    half_side: float = Field(0.05, gt=0.0, le=1.0, description="half side of the squares of the fitness (m)")
-    resolution: float = Field(0.025, gt=0.0, le=0.5, description="side of a raster cell of the fitness (m)")
-    refine: bool = Field(True, description="polish the best pose by point-to-line Gauss-Newton")
+    half_side: float = Field(
+        default=0.05, gt=0.0, le=1.0, description="half side of the squares of the fitness (m)"
+    )
+    resolution: float = Field(
+        default=0.025, gt=0.0, le=0.5, description="side of a raster cell of the fitness (m)"
+    )
+    refine: bool = Field(default=True, description="polish the best pose by point-to-line Gauss-Newton")
     search_points: int = Field(
-        96,
+        default=96,
         ge=10,
         description="points of the scan that the search looks at, spread over it, in a window of the paper's size "
         "and where a refinement follows, which uses all",
     )
-    refine_iterations: int = Field(12, ge=1, description="iterations of the refinement, at most")
+    refine_iterations: int = Field(default=12, ge=1, description="iterations of the refinement, at most")
 
 
 class PopulationReference(Reference):

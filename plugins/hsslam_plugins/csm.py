@@ -22,17 +22,20 @@ class CsmConfig(MatcherConfig):
     """Parameters of the correlative scan matcher."""
 
     deviation: float = Field(
-        0.04, gt=0.0, le=1.0, description="standard deviation of the likelihood field around surfaces (m)"
+        default=0.04,
+        gt=0.0,
+        le=1.0,
+        description="standard deviation of the likelihood field around surfaces (m)",
     )
     resolution: float = Field(
-        0.025,
+        default=0.025,
         gt=0.0,
         le=0.5,
         description="side of a raster cell, and step of the search in x and y (m); in heading the step is the "
         "turn that moves the farthest point so far",
     )
     temperature: float = Field(
-        1.0,
+        default=1.0,
         gt=0.0,
         description="points' worth of likelihood by which a pose's weight in the mean around the best falls to 1 / e",
     )

@@ -17,19 +17,21 @@ class ExhaustiveConfig(PopulationConfig):
     """Parameters of the exhaustive search; those of the fitness as for the population searches."""
 
     proof: Literal["window", "lattice"] = Field(
-        "window",
+        default="window",
         description="`window`: the best of all poses in the window; `lattice`: the best of those a cell of the "
         "raster apart, and in heading the turn that moves the farthest point by a cell",
     )
     tolerance: float = Field(
-        0.005,
+        default=0.005,
         ge=0.0,
         lt=1.0,
         description="`window`: another pose may be better by this share of the most there could be; below one "
         "point in all: by none",
     )
     budget: int = Field(
-        300_000, ge=1, description="`window`: boxes of poses looked at, at most; then the proof is given up"
+        default=300_000,
+        ge=1,
+        description="`window`: boxes of poses looked at, at most; then the proof is given up",
     )
 
 

@@ -15,21 +15,28 @@ class GlasmConfig(PopulationConfig):
     """Parameters of GLASM; population, generations, rates, bits and square as its authors published them."""
 
     fitness: FitnessName = Field(
-        "paper",
+        default="paper",
         description="`paper`: squares around the points; `surface`: squares along the segments between them; "
         "`likelihood`: a smooth field around these",
     )
     half_side: float = Field(
-        0.0525, gt=0.0, le=1.0, description="half side of the squares of the fitness (m): 10.5 cm squares"
+        default=0.0525,
+        gt=0.0,
+        le=1.0,
+        description="half side of the squares of the fitness (m): 10.5 cm squares",
     )
-    refine: bool = Field(False, description="polish the best pose by point-to-line Gauss-Newton")
-    population_size: int = Field(120, ge=2, description="chromosomes in a generation")
-    generations: int = Field(12, ge=1, description="generations evaluated")
-    bits: int = Field(9, ge=2, le=20, description="bits of the Gray code of each variable")
-    crossover_rate: float = Field(1.0, ge=0.0, le=1.0, description="probability that a child has two parents")
-    mutation_rate: float = Field(0.12, ge=0.0, le=1.0, description="probability that a bit of a child flips")
+    refine: bool = Field(default=False, description="polish the best pose by point-to-line Gauss-Newton")
+    population_size: int = Field(default=120, ge=2, description="chromosomes in a generation")
+    generations: int = Field(default=12, ge=1, description="generations evaluated")
+    bits: int = Field(default=9, ge=2, le=20, description="bits of the Gray code of each variable")
+    crossover_rate: float = Field(
+        default=1.0, ge=0.0, le=1.0, description="probability that a child has two parents"
+    )
+    mutation_rate: float = Field(
+        default=0.12, ge=0.0, le=1.0, description="probability that a bit of a child flips"
+    )
     tournament: int = Field(
-        3, ge=1, description="contestants for each parent (the authors give no selection)"
+        default=3, ge=1, description="contestants for each parent (the authors give no selection)"
     )
 
 

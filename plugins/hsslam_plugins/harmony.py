@@ -19,32 +19,34 @@ from hsslam.search import PopulationConfig, PopulationMatcher
 class HarmonyConfig(PopulationConfig):
     """Harmony memory and its improvisation; defaults as published (paper, section 6)."""
 
-    memory_size: int = Field(30, ge=4, description="harmonies in the memory (HMS)")
+    memory_size: int = Field(default=30, ge=4, description="harmonies in the memory (HMS)")
     memory_considering_rate: float = Field(
-        0.88, ge=0.0, le=1.0, description="probability that a variable comes from the memory (HMCR)"
+        default=0.88, ge=0.0, le=1.0, description="probability that a variable comes from the memory (HMCR)"
     )
     pitch_adjusting_rate_min: float = Field(
-        0.55, ge=0.0, le=1.0, description="probability of pitch adjustment at the start (PAR_min)"
+        default=0.55, ge=0.0, le=1.0, description="probability of pitch adjustment at the start (PAR_min)"
     )
     pitch_adjusting_rate_max: float = Field(
-        0.98, ge=0.0, le=1.0, description="probability of pitch adjustment at the end (PAR_max)"
+        default=0.98, ge=0.0, le=1.0, description="probability of pitch adjustment at the end (PAR_max)"
     )
     bandwidth_max: float = Field(
-        8.0,
+        default=8.0,
         gt=0.0,
         description="largest pitch adjustment at the start (BW_max; cm for x and y, degrees for theta)",
     )
     bandwidth_min: float = Field(
-        0.2,
+        default=0.2,
         gt=0.0,
         description="largest pitch adjustment at the end (BW_min; cm for x and y, degrees for theta)",
     )
 
     patience: int = Field(
-        0, ge=0, description="end after this many evaluations that changed nothing (0: use up the budget)"
+        default=0,
+        ge=0,
+        description="end after this many evaluations that changed nothing (0: use up the budget)",
     )
     wide_windows: bool = Field(
-        True,
+        default=True,
         description="in windows far larger than the paper's: a larger memory, budget and bandwidth, a coarser raster",
     )
 

@@ -17,12 +17,23 @@ WIDE_WEIGHT = 0.8
 class HideConfig(HarmonyConfig):
     """Parameters of HIDE."""
 
-    evaluations: int = Field(220, ge=1, description="fitness evaluations after the memory is filled (NFE)")
-    harmony_run: int = Field(14, ge=1, description="improvisations between two differential steps (HRT)")
-    attraction: float = Field(0.7, ge=0.0, le=2.0, description="pull towards the best harmony (lambda)")
-    weight: float = Field(0.44, ge=0.0, le=2.0, description="weight of the difference of two harmonies (F)")
+    evaluations: int = Field(
+        default=220, ge=1, description="fitness evaluations after the memory is filled (NFE)"
+    )
+    harmony_run: int = Field(
+        default=14, ge=1, description="improvisations between two differential steps (HRT)"
+    )
+    attraction: float = Field(
+        default=0.7, ge=0.0, le=2.0, description="pull towards the best harmony (lambda)"
+    )
+    weight: float = Field(
+        default=0.44, ge=0.0, le=2.0, description="weight of the difference of two harmonies (F)"
+    )
     crossover_rate: float = Field(
-        0.9, ge=0.0, le=1.0, description="share of variables taken from the mutant (the paper gives none)"
+        default=0.9,
+        ge=0.0,
+        le=1.0,
+        description="share of variables taken from the mutant (the paper gives none)",
     )
 
 

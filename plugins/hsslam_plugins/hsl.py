@@ -14,7 +14,7 @@ from hsslam_plugins.harmony import HarmonyConfig, HarmonyMatcher
 class HslConfig(HarmonyConfig):
     """Parameters of HSL."""
 
-    improvisations: int = Field(250, ge=1, description="new harmonies made (NI)")
+    improvisations: int = Field(default=250, ge=1, description="new harmonies made (NI)")
 
 
 class Hsl(HarmonyMatcher[HslConfig]):

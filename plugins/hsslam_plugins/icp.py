@@ -24,34 +24,36 @@ from hsslam_plugins.open3d_library import one_thread, open3d
 class IcpConfig(LocalConfig):
     """Parameters of ICP: Open3D's registration run in stages, each with a smaller reach than the last."""
 
-    stages: int = Field(2, ge=1, le=10, description="registrations, from coarse to fine")
+    stages: int = Field(default=2, ge=1, le=10, description="registrations, from coarse to fine")
     distance_start: float = Field(
-        0.7,
+        default=0.7,
         gt=0.0,
         description="reach of a correspondence in the first stage (m); shrinks geometrically",
     )
-    distance_end: float = Field(0.2, gt=0.0, description="reach of a correspondence in the last stage (m)")
+    distance_end: float = Field(
+        default=0.2, gt=0.0, description="reach of a correspondence in the last stage (m)"
+    )
     robust_scale_start: float = Field(
-        0.1,
+        default=0.1,
         gt=0.0,
         description="scale of the Cauchy loss in the first stage (m); larger residuals weigh less",
     )
     robust_scale_end: float = Field(
-        0.03, gt=0.0, description="scale of the Cauchy loss in the last stage (m)"
+        default=0.03, gt=0.0, description="scale of the Cauchy loss in the last stage (m)"
     )
-    max_iterations: int = Field(30, ge=1, description="iterations of a stage, at most")
+    max_iterations: int = Field(default=30, ge=1, description="iterations of a stage, at most")
     tolerance: float = Field(
-        1e-6,
+        default=1e-6,
         gt=0.0,
         description="a stage ends when fitness and inlier error change by less than this",
     )
     normal_neighbours: int = Field(
-        5,
+        default=5,
         ge=1,
         description="neighbours either side, in beam order, that a normal is fitted to",
     )
     normal_radius: float = Field(
-        0.3, gt=0.0, description="neighbours further away than this are left out (m)"
+        default=0.3, gt=0.0, description="neighbours further away than this are left out (m)"
     )
 
     @model_validator(mode="after")

@@ -29,28 +29,34 @@ class KissIcpConfig(LocalConfig):
     """Parameters of KISS-ICP's voxel map and registration, run twice: coarse, then fine."""
 
     voxel_size: float = Field(
-        0.7,
+        default=0.7,
         gt=0.0,
         description="side of a voxel of the reference (m); a correspondence is sought in a voxel and its "
         "neighbours only, so this bounds its reach: small voxels lose a match silently, large ones are slow",
     )
     points_per_voxel: int = Field(
-        150,
+        default=150,
         ge=1,
         description="points a voxel holds, at most; it takes none closer to another than "
         "voxel_size / sqrt(this), so this sets how finely the reference is sampled (the package's own "
         "20 is meant for 3D and too coarse here)",
     )
-    distance_start: float = Field(0.7, gt=0.0, description="reach of a correspondence in the coarse run (m)")
-    distance_end: float = Field(0.2, gt=0.0, description="reach of a correspondence in the fine run (m)")
+    distance_start: float = Field(
+        default=0.7, gt=0.0, description="reach of a correspondence in the coarse run (m)"
+    )
+    distance_end: float = Field(
+        default=0.2, gt=0.0, description="reach of a correspondence in the fine run (m)"
+    )
     robust_scale_start: float = Field(
-        0.15, gt=0.0, description="scale of the Geman-McClure weight in the coarse run (m)"
+        default=0.15, gt=0.0, description="scale of the Geman-McClure weight in the coarse run (m)"
     )
     robust_scale_end: float = Field(
-        0.05, gt=0.0, description="scale of the Geman-McClure weight in the fine run (m)"
+        default=0.05, gt=0.0, description="scale of the Geman-McClure weight in the fine run (m)"
     )
-    max_iterations: int = Field(500, ge=1, description="iterations of a run, at most")
-    tolerance: float = Field(1e-4, gt=0.0, description="a run ends with a step shorter than this (m and rad)")
+    max_iterations: int = Field(default=500, ge=1, description="iterations of a run, at most")
+    tolerance: float = Field(
+        default=1e-4, gt=0.0, description="a run ends with a step shorter than this (m and rad)"
+    )
 
     @model_validator(mode="after")
     def _within_reach(self) -> KissIcpConfig:

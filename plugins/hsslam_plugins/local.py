@@ -15,7 +15,7 @@ class LocalConfig(MatcherConfig):
     """Parameters of a method that starts at the guess and knows no window."""
 
     window_slack: float = Field(
-        0.2,
+        default=0.2,
         ge=0.0,
         le=1.0,
         description="an answer outside the search window by up to this share of its half sides is moved onto "

@@ -13,24 +13,27 @@ from hsslam_plugins.local import LocalConfig
 class PlIcpConfig(LocalConfig):
     """Parameters of PL-ICP: a stage that reaches far, and one that is precise."""
 
-    max_iterations: int = Field(30, ge=1, description="iterations of a stage, at most")
+    max_iterations: int = Field(default=30, ge=1, description="iterations of a stage, at most")
     distance_start: float = Field(
-        0.6, gt=0.0, le=3.0, description="reach of a correspondence at the start (m); shrinks linearly"
+        default=0.6,
+        gt=0.0,
+        le=3.0,
+        description="reach of a correspondence at the start (m); shrinks linearly",
     )
     distance_middle: float = Field(
-        0.15,
+        default=0.15,
         gt=0.0,
         le=0.15,
         description="reach at the end of the first stage and the start of the second (m)",
     )
-    distance_end: float = Field(0.08, gt=0.0, le=0.15, description="reach at the end (m)")
+    distance_end: float = Field(default=0.08, gt=0.0, le=0.15, description="reach at the end (m)")
     robust_scale_start: float = Field(
-        0.15,
+        default=0.15,
         gt=0.0,
         description="scale of the Cauchy weight in the first stage (m): larger residuals weigh less",
     )
     robust_scale_end: float = Field(
-        0.03, gt=0.0, description="scale of the Cauchy weight in the second stage (m)"
+        default=0.03, gt=0.0, description="scale of the Cauchy weight in the second stage (m)"
     )
 
     @model_validator(mode="after")

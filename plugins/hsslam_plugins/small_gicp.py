@@ -26,21 +26,25 @@ class SmallGicpConfig(LocalConfig):
     """Parameters of the registration, run twice: coarse, then fine."""
 
     layer_distance: float = Field(
-        0.1,
+        default=0.1,
         gt=0.0,
         description="points are copied this far above and below the plane (m), so that a wall becomes a plane "
         "that a covariance can be fitted to",
     )
     neighbours: int = Field(
-        10, ge=5, description="points that a point's covariance is fitted to, copies included"
+        default=10, ge=5, description="points that a point's covariance is fitted to, copies included"
     )
-    distance_start: float = Field(0.5, gt=0.0, description="reach of a correspondence in the coarse run (m)")
-    distance_end: float = Field(0.2, gt=0.0, description="reach of a correspondence in the fine run (m)")
-    max_iterations: int = Field(30, ge=1, description="iterations of a run, at most")
+    distance_start: float = Field(
+        default=0.5, gt=0.0, description="reach of a correspondence in the coarse run (m)"
+    )
+    distance_end: float = Field(
+        default=0.2, gt=0.0, description="reach of a correspondence in the fine run (m)"
+    )
+    max_iterations: int = Field(default=30, ge=1, description="iterations of a run, at most")
     translation_tolerance: float = Field(
-        1e-4, gt=0.0, description="a run ends with a step shorter than this (m)"
+        default=1e-4, gt=0.0, description="a run ends with a step shorter than this (m)"
     )
-    rotation_tolerance: float = Field(1e-4, gt=0.0, description="and a turn smaller than this (rad)")
+    rotation_tolerance: float = Field(default=1e-4, gt=0.0, description="and a turn smaller than this (rad)")
 
     @model_validator(mode="after")
     def _shrinking(self) -> SmallGicpConfig:
