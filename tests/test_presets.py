@@ -63,9 +63,9 @@ def test_presets_lie_under_the_file_and_over_the_base(tmp_path: Path) -> None:
 
 def test_a_later_preset_wins_and_an_option_stands_in_for_the_files(tmp_path: Path) -> None:
     path = tmp_path / "c.yaml"
-    path.write_text("preset: [urg-04lx, warehouse]\n")
+    path.write_text("preset: [rplidar-a2, warehouse]\n")
     assert load_config(path).keyframes.distance == 0.5
-    path.write_text("preset: [warehouse, urg-04lx]\n")
+    path.write_text("preset: [warehouse, rplidar-a2]\n")
     assert load_config(path).keyframes.distance == 0.2
     assert load_config(path).loops.radius == 6.0
     assert load_config(path, presets=["office"]) == Config()
@@ -137,7 +137,7 @@ def test_init_writes_a_file_that_runs_use_and_never_overwrites(
 
 
 def test_config_show_and_presets() -> None:
-    shown = hsslam("config", "show", "--preset", "warehouse", "--preset", "urg-04lx")
+    shown = hsslam("config", "show", "--preset", "warehouse", "--preset", "rplidar-a2")
     assert yaml.safe_load(shown.stdout)["keyframes"]["distance"] == 0.2
     listed = hsslam("config", "presets")
     assert all(name in listed.stdout for name in SENSORS + PLACES)
