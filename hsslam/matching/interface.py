@@ -201,6 +201,10 @@ class Matcher(ABC, Generic[ConfigT]):
     summary: ClassVar[str] = ""
     """One line for listings."""
 
+    covers_window: ClassVar[bool] = False
+    """Whether a window of a metre and more is searched as well as a small one. Where it is not, because the method
+    is local or its effort fixed, a wide window is searched in tiles, each of them a match."""
+
     def __init__(self, config: ConfigT | None = None) -> None:
         self.check_available()
         self.config: ConfigT = config if config is not None else self.Config()  # type: ignore[assignment]

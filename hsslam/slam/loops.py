@@ -16,7 +16,7 @@ from hsslam.se2 import Points, Pose, Poses, between, compose, inverse, wrap
 from hsslam.slam.events import LoopChecked
 from hsslam.slam.fusion import rotated, squared_mahalanobis
 from hsslam.slam.randomness import Purpose, generator
-from hsslam.slam.recovery import best_elsewhere
+from hsslam.slam.recovery import best_elsewhere, match_tiles
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import merge
 from hsslam.slam.tracker import search_window
@@ -162,7 +162,13 @@ class LoopCloser:
         base = place.of(first)
         rng = generator(self._config.seed, Purpose.LOOP, first, second)
         window = self._window(candidate)
-        result: MatchResult = self._matcher.match(place.reference, scan, compose(base, guess), window, rng)
+        result: MatchResult
+        if self._matcher.covers_window or window.half_x <= self._tile.half_x:
+            result = self._matcher.match(place.reference, scan, compose(base, guess), window, rng)
+        else:
+            result = match_tiles(
+                self._matcher, place.reference, scan, compose(base, guess), window, self._tile, rng
+            )
         return LoopChecked(
             first=first,
             second=second,

@@ -46,6 +46,7 @@ class Csm(Matcher[CsmConfig]):
 
     Config = CsmConfig
     summary = "correlative scan matching on a likelihood field (Olson 2009)"
+    covers_window = True
 
     def prepare(self, points: Points) -> ExhaustiveReference:
         """Make the likelihood field and its coarser levels; see `hsslam.matching.Matcher.prepare`."""

@@ -46,6 +46,7 @@ class Exhaustive(Matcher[ExhaustiveConfig]):
 
     Config = ExhaustiveConfig
     summary = "branch and bound: the proven best pose of the window (Olson 2009; Hess et al. 2016)"
+    covers_window = True
 
     def prepare(self, points: Points) -> ExhaustiveReference:
         """Rasterise a reference and pool its maxima; see `hsslam.matching.Matcher.prepare`."""

@@ -101,6 +101,8 @@ HarmonyConfigT = TypeVar("HarmonyConfigT", bound=HarmonyConfig)
 class HarmonyMatcher(PopulationMatcher[HarmonyConfigT], Generic[HarmonyConfigT]):
     """Base of HSL and HIDE: how much effort a window is worth."""
 
+    covers_window = True
+
     @property
     @abstractmethod
     def budget(self) -> int:

@@ -19,7 +19,7 @@ from hsslam.slam.events import SlamResult
 from hsslam.slam.pipeline import Slam
 from hsslam.trajectory import Trajectory
 from hsslam_eval.accuracy import measure
-from hsslam_eval.plots import common_limits, occupied_box
+from hsslam_eval.map_plots import common_limits, occupied_box
 from hsslam_eval.reproduce import drawing, methods
 from hsslam_eval.reproduce.data import attribution, describe, is_simulated, open_data
 from hsslam_eval.reproduce.experiment import Claim, Drawing, Experiment, Request, Row, Table, Tell, Value
