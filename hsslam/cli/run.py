@@ -64,6 +64,9 @@ def run(
     resume: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Go on with the run that died in this folder.")
     ] = None,
+    profile: Annotated[
+        bool, typer.Option("--profile", help="Say at the end where the time went, stage by stage.")
+    ] = False,
     quiet: Quiet = False,
     on_error: OnError = None,
     plugin: Plugin = None,
@@ -73,6 +76,7 @@ def run(
     In it: trajectories (TUM), the pose graph (g2o), the map (ROS), metrics, timings, the resolved settings.
     Its files open in the usual tools.
     """
+    from hsslam.cli.running import profile as stages
     from hsslam.cli.running import run_log, summary
     from hsslam.datasets.catalogue import open_dataset
     from hsslam.slam.folder import RunFolder
@@ -110,6 +114,8 @@ def run(
             metrics, timings = run_log(folder, header, resolved, log, shown)
     except KeyboardInterrupt as error:
         raise KeyboardInterrupt(f"go on with: hsslam run --resume {folder.path}") from error
+    if profile:
+        console.pairs(stages(timings))
     if not quiet:
         console.pairs(summary(folder, log, metrics, timings))
         if log.info.attribution:

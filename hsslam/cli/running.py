@@ -35,6 +35,7 @@ def run_log(
                 journal.write(event)
                 loops += isinstance(event, LoopChecked) and event.accepted
             shown.update(done, f"{loops} loops")
+        tracked = time.perf_counter()
         shown.stage("optimising the graph")
         for event in slam.finish():
             journal.write(event)
@@ -43,7 +44,7 @@ def run_log(
         shown.stage("drawing the map")
         folder.write_result(result, config, title=f"{log.info.name}, {config.matcher.name}")
     metrics = _metrics(result, config, log)
-    timings = _timings(result, folder, wall, cpu, solved)
+    timings = _timings(result, folder, cpu, (wall, tracked, solved))
     folder.write_json("metrics.json", metrics)
     folder.write_json("timings.json", timings)
     return metrics, timings
@@ -96,20 +97,49 @@ def _metrics(result: SlamResult, config: Config, log: Dataset) -> dict[str, Any]
         "loops_tried": len(result.loops),
         "loops_accepted": sum(loop.accepted for loop in result.loops),
         **errors,
+        "online": measure(result.online, result.odometry, log.truth(), log.relations()),
         "statistics": result.statistics,
     }
 
 
-def _timings(result: SlamResult, folder: RunFolder, wall: float, cpu: float, solved: float) -> dict[str, Any]:
+def _timings(
+    result: SlamResult, folder: RunFolder, cpu: float, moments: tuple[float, float, float]
+) -> dict[str, Any]:
+    """Times of a run; ``moments`` are its start, the end of the log, and the end of the last optimisation."""
+    wall, tracked, solved = moments
     now = time.perf_counter()
     stamps = result.odometry.stamps
     duration = float(np.ptp(stamps)) if len(stamps) else 0.0
     return {
         "wall_s": now - wall,
         "cpu_s": time.process_time() - cpu,
-        "stages_s": {**result.seconds, "output": now - solved},
+        "online_s": tracked - wall,
+        "final_s": solved - tracked,
+        "output_s": now - solved,
+        "stages_s": {**_online_stages(result, tracked - wall), "output": now - solved},
         "real_time_factor": duration / (now - wall),
         "scans_per_s": len(result.trajectory) / (now - wall),
         "peak_memory_mb": peak_memory_mb(),
         "resumed": folder.replay is not None,
     }
+
+
+_AT_THE_END = ("final", "rescan")
+
+
+def _online_stages(result: SlamResult, online: float) -> dict[str, float]:
+    """Seconds by stage; what no stage of the online pass counts is reading, bookkeeping and the journal."""
+    stages = dict(result.seconds)
+    counted = sum(seconds for stage, seconds in stages.items() if stage not in _AT_THE_END)
+    return {**stages, "reading and bookkeeping": max(online - counted, 0.0)}
+
+
+def profile(timings: dict[str, Any]) -> list[tuple[str, str]]:
+    """The lines that ``hsslam run --profile`` adds: where the time went, longest first."""
+    wall = timings["wall_s"]
+    stages = sorted(timings["stages_s"].items(), key=lambda stage: -stage[1])
+    return [
+        ("time", f"online {timings['online_s']:.2f} s, final {timings['final_s']:.2f} s"),
+        *((f"  {stage}", f"{seconds:8.2f} s  {seconds / wall:6.1%}") for stage, seconds in stages),
+        ("peak memory", f"{timings['peak_memory_mb']:.0f} MB"),
+    ]

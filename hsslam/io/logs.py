@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 from typing import Literal
@@ -128,7 +129,8 @@ def detect(path: Path | str) -> LogFormat:
     if named is not None and named.name != "carmen":
         found = repr(head[:8]) if head else "an empty file"
         raise DataError(f"{path}: expected a {named.title}, as its name says, found {found}")
-    return FORMATS["gfs" if _looks_like_gfs(path) else "carmen"]
+    state = path.stat()
+    return FORMATS["gfs" if _looks_like_gfs(path, state.st_size, state.st_mtime_ns) else "carmen"]
 
 
 def read_log(
@@ -257,7 +259,8 @@ def _bag_in_folder(path: Path) -> str:
     return "mcap" if any(path.glob("*.mcap")) else "ros2"
 
 
-def _looks_like_gfs(path: Path) -> bool:
+@lru_cache(maxsize=8)  # a log is asked for its format several times, and its first lines may be compressed
+def _looks_like_gfs(path: Path, size: int, changed: int) -> bool:
     from hsslam.io.compressed import read_lines
     from hsslam.io.gfs import RECORDS
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _TRAJECTORY_COLOUR = "#0072b2"
 _LOOP_COLOUR = "#d55e00"
+_REFUSED_COLOUR = "#cc79a7"
 _UNKNOWN_SHADE = 0.80
 
 
@@ -28,6 +29,7 @@ def write_map_png(
     loops: NDArray[np.float64] | Sequence[Sequence[float]] | None = None,
     title: str = "",
     *,
+    refused: NDArray[np.float64] | Sequence[Sequence[float]] | None = None,
     dpi: int = 120,
 ) -> None:
     """Draw a map, the way of the robot and its loop closures, into a PNG file; needs no display.
@@ -44,6 +46,8 @@ def write_map_png(
         x1, y1, x2, y2 (m) of the two places that each loop closure ties together.
     title : str
         Over the picture.
+    refused : float64 (R, 4), optional
+        Of loops that were found and not believed.
     dpi : int
         Pixels per inch of a figure 9 inches wide.
 
@@ -61,7 +65,7 @@ def write_map_png(
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    draw_map(axes, grid, trajectory, loops)
+    draw_map(axes, grid, trajectory, loops, refused)
     axes.set_title(title)
     handles, labels = axes.get_legend_handles_labels()
     if handles:
@@ -75,6 +79,7 @@ def draw_map(
     grid: OccupancyGrid,
     trajectory: Trajectory | None = None,
     loops: NDArray[np.float64] | Sequence[Sequence[float]] | None = None,
+    refused: NDArray[np.float64] | Sequence[Sequence[float]] | None = None,
 ) -> None:
     """Draw into axes what `write_map_png` draws, without title and legend (its entries are labelled)."""
     from matplotlib.collections import LineCollection
@@ -89,19 +94,24 @@ def draw_map(
         ends: dict[str, Any] = {"color": _TRAJECTORY_COLOUR, "markeredgecolor": "black", "linestyle": "none"}
         axes.plot(x[:1], y[:1], marker="o", label="start", **ends)
         axes.plot(x[-1:], y[-1:], marker="s", label="end", **ends)
-    ties = np.asarray(() if loops is None else loops, dtype=np.float64).reshape(-1, 2, 2)
-    if len(ties):
-        # Thin and behind the trajectory: a log that comes back often has thousands of ties.
-        axes.add_collection(
-            LineCollection(
-                list(ties),
-                colors=_LOOP_COLOUR,
-                linewidths=0.6,
-                alpha=0.7,
-                label=f"loop closures ({len(ties)})",
-                zorder=1.5,
+    # Thin and behind the trajectory: a log that comes back often has thousands of ties.
+    for label, lines, colour, style in (
+        ("loop closures", loops, _LOOP_COLOUR, "solid"),
+        ("loops refused", refused, _REFUSED_COLOUR, "dotted"),
+    ):
+        ties = np.asarray(() if lines is None else lines, dtype=np.float64).reshape(-1, 2, 2)
+        if len(ties):
+            axes.add_collection(
+                LineCollection(
+                    list(ties),
+                    colors=colour,
+                    linestyles=style,
+                    linewidths=0.6,
+                    alpha=0.7,
+                    label=f"{label} ({len(ties)})",
+                    zorder=1.5,
+                )
             )
-        )
     axes.set_xlim(*grid.extent[:2])
     axes.set_ylim(*grid.extent[2:])
     axes.set_aspect("equal")

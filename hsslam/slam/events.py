@@ -65,6 +65,11 @@ class LoopChecked:
     agreeing: int = 0
     ambiguity: float = 0.0
 
+    @property
+    def contested(self) -> bool:
+        """Refused although the match itself was good: ambiguous, or the only one to say so."""
+        return not self.accepted and (self.agreeing > 0 or self.ambiguity > 0.0 or "agree" in self.reason)
+
 
 @dataclass(frozen=True)
 class Optimised:

@@ -20,13 +20,16 @@ from hsslam.mapping.picture import write_map_png
 from hsslam.mapping.rosmap import write_rosmap
 from hsslam.slam.events import SlamResult
 from hsslam.slam.journal import Header, Journal, Replay, read_journal
+from hsslam.slam.loop_table import write_loops
 
 JOURNAL = "journal.jsonl"
 FILES = (
     "config.yaml",
     "trajectory.tum",
     "odometry.tum",
+    "online.tum",
     "graph.g2o",
+    "loops.csv",
     "map.pgm",
     "map.yaml",
     "map.png",
@@ -140,6 +143,8 @@ class RunFolder:
         """
         write_tum(self.path / "trajectory.tum", result.trajectory)
         write_tum(self.path / "odometry.tum", result.odometry)
+        write_tum(self.path / "online.tum", result.online)
+        write_loops(self.path / "loops.csv", result.loops)
         write_g2o(
             self.path / "graph.g2o",
             result.keyframe_poses,
@@ -150,10 +155,15 @@ class RunFolder:
         )
         write_rosmap(self.path / "map", grid)
         places = result.keyframe_poses
-        loops = [
-            (*places[loop.first, :2], *places[loop.second, :2]) for loop in result.loops if loop.accepted
-        ]
-        write_map_png(self.path / "map.png", grid, result.trajectory, loops, title)
+        accepted, contested = (
+            [
+                (*places[loop.first, :2], *places[loop.second, :2])
+                for loop in result.loops
+                if (loop.accepted if wanted else loop.contested)
+            ]
+            for wanted in (True, False)
+        )
+        write_map_png(self.path / "map.png", grid, result.trajectory, accepted, title, refused=contested)
 
     def write_json(self, name: str, values: Mapping[str, Any]) -> None:
         """Write a file of JSON into the folder."""

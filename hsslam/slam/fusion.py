@@ -101,3 +101,15 @@ def fuse(
         for j in range(i):
             out[i, j] = out[j, i] = 0.5 * (out[i, j] + out[j, i])
     return pose, out
+
+
+@kernel
+def is_positive_definite(matrix: NDArray[np.float64]) -> bool:
+    """Whether a symmetric (3, 3) matrix is finite and positive definite (Sylvester's criterion)."""
+    if not np.isfinite(matrix).all():
+        return False
+    a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
+    d, e, f = matrix[1, 1], matrix[1, 2], matrix[2, 2]
+    second = a * d - b * b
+    third = a * (d * f - e * e) - b * (b * f - e * c) + c * (b * e - d * c)
+    return bool(a > 0.0 and second > 0.0 and third > 0.0)

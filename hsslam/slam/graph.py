@@ -13,6 +13,7 @@ from hsslam.config import GraphSection
 from hsslam.errors import HsslamError
 from hsslam.se2 import Pose, Poses, between, compose
 from hsslam.slam.events import Edge
+from hsslam.slam.fusion import is_positive_definite, rotated
 from hsslam.slam.uncertainty import RelativeUncertainty
 
 PRIOR_STD = 1e-4
@@ -23,11 +24,11 @@ FLOOR_STD_THETA = math.radians(0.1)
 """No relative pose is trusted beyond this: errors that matches share do not show in their covariances."""
 
 
-UPDATE_EVERY = 10
+UPDATE_EVERY = 15
 """Loops that change next to nothing are gathered; after so many of them the estimate is brought up to date."""
 
-NEXT_TO_NOTHING_XY = 0.02
-NEXT_TO_NOTHING_THETA = math.radians(0.3)
+NEXT_TO_NOTHING_XY = 0.03
+NEXT_TO_NOTHING_THETA = math.radians(0.5)
 """A loop that disagrees with the estimate by less than this (m, rad) changes next to nothing."""
 
 
@@ -187,14 +188,12 @@ def body_covariance(edge: Edge) -> NDArray[np.float64]:
     covariance = edge.covariance
     if not np.isfinite(edge.relative).all():
         raise GraphError(f"the constraint between keyframes {edge.first} and {edge.second} is not finite")
-    if not np.isfinite(covariance).all() or np.linalg.eigvalsh(covariance)[0] <= 0.0:
+    if not is_positive_definite(covariance):
         raise GraphError(
             f"the covariance of the constraint between keyframes {edge.first} and {edge.second} "
             "is not positive definite"
         )
-    c, s = math.cos(edge.relative[2]), math.sin(edge.relative[2])
-    rotation = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    turned: NDArray[np.float64] = rotation @ covariance @ rotation.T
+    turned = rotated(covariance, edge.relative[2])
     turned[0, 0] += FLOOR_STD_XY**2
     turned[1, 1] += FLOOR_STD_XY**2
     turned[2, 2] += FLOOR_STD_THETA**2

@@ -22,7 +22,7 @@ from hsslam.slam.submap import merge
 from hsslam.slam.tracker import search_window
 from hsslam.slam.uncertainty import RelativeUncertainty
 
-REFERENCES_KEPT = 24
+REFERENCES_KEPT = 10
 """Prepared submaps kept for the next candidates; a robot that comes back passes several of them in a row."""
 
 SIGMAS = 3.0
