@@ -11,8 +11,8 @@ from pathlib import Path
 MATCHERS = ("glasm", "hide", "hsl", "icp", "kiss_icp")
 TABLES = ("trials.csv", "slam.csv")
 REPORT_FILES = ("report.html", "report.md", *TABLES, "trials_raw.csv", "comparison.json")
-MAX_TRANSLATION_M = 0.025
-MAX_ROTATION_DEG = 0.6
+MAX_TRANSLATION_M = 0.0145
+MAX_ROTATION_DEG = 0.25
 INTEL_SCANS = 13_631
 INTEL_RELATIONS = 2_984
 

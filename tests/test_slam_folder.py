@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import platform
 from pathlib import Path
@@ -40,6 +41,17 @@ def result() -> SlamResult:
     poses = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.1], [0.2, 0.1, -3.0]])
     scans = [LaserScan(stamps[i], ranges, geometry, poses[i], index=i) for i in range(3)]
     loop = LoopChecked(0, 2, True, "", poses[2], np.eye(3) * 1e-4, 0.9, 10)
+    lonely = LoopChecked(
+        1,
+        2,
+        False,
+        "0 other loops agree with it, not 2",
+        poses[1],
+        np.eye(3) * 4e-4,
+        0.8,
+        20,
+        expected_std=0.5,
+    )
     edges = [
         Edge(0, 1, poses[1], np.diag([1e-4, 2e-4, 3e-4]), "odometry"),
         Edge(1, 2, np.array([0.1, 0.1, 3.0]), np.eye(3) * 1e-4, "odometry"),
@@ -47,7 +59,9 @@ def result() -> SlamResult:
     ]
     trajectory = Trajectory(stamps, poses, np.arange(3))
     odometry = Trajectory(stamps, poses + 0.01, np.arange(3))
-    return SlamResult(trajectory, trajectory, odometry, scans, poses, edges, [loop], 3, {"track": 0.1})
+    return SlamResult(
+        trajectory, trajectory, odometry, scans, poses, edges, [loop, lonely], 3, {"track": 0.1}
+    )
 
 
 def files(folder: RunFolder) -> set[str]:
@@ -72,6 +86,12 @@ def test_a_finished_run_leaves_every_file_and_they_read_back(
     assert [(edge[0], edge[1]) for edge in edges] == [(0, 1), (1, 2), (0, 2)]
     grid = read_rosmap(folder.path / "map.yaml")
     assert grid.resolution == config.map.resolution
+    with (folder.path / "loops.csv").open(newline="") as file:
+        accepted, refused = csv.DictReader(file)
+    assert (accepted["first"], accepted["second"], accepted["accepted"]) == ("0", "2", "1")
+    assert (refused["accepted"], refused["reason"]) == ("0", "0 other loops agree with it, not 2")
+    assert float(refused["std_x"]) == pytest.approx(0.02)
+    assert float(refused["expected_std"]) == 0.5
     assert (folder.path / "map.png").read_bytes().startswith(b"\x89PNG")
     assert json.loads((folder.path / "metrics.json").read_text()) == {"scans": 3}
     resolved = load_config(folder.path / "config.yaml")
