@@ -174,6 +174,10 @@ class GraphSection(Section):
     refine_rounds: int = Field(
         default=1, ge=0, description="rounds of matching overlapping keyframes again at the end"
     )
+    marginals: bool = Field(
+        default=False,
+        description="work out at the end how well every keyframe's pose is known (covariances.csv)",
+    )
     overlap_radius: float = Field(
         default=3.0, gt=0.0, description="keyframes within this distance may overlap (m)"
     )

@@ -213,3 +213,35 @@ def test_tiles_cover_the_wide_window_and_overlap() -> None:
         assert middles == pytest.approx(-middles[::-1])
         assert middles[-1] + tile >= wide
         assert (np.diff(middles) < 2.0 * tile).all()
+
+
+def test_marginal_covariances_grow_along_a_chain_and_shrink_with_a_loop() -> None:
+    long = np.diag([1e-4, 9e-4, 1e-4])
+    chain = PoseGraph(GraphSection(), pose(1.0, 2.0, 0.5))
+    for _ in range(10):
+        chain.add_keyframe(pose(1.0, 0.0, 0.3), long)
+    open_end = chain.marginal_covariances()
+    assert open_end.shape == (11, 3, 3)
+    traces = open_end[:, 0, 0] + open_end[:, 1, 1]
+    assert (np.diff(traces) > 0.0).all()
+    # One step along x, seen in a map that is turned by 0.5: heading noise of the start is negligible.
+    c, s = math.cos(0.5), math.sin(0.5)
+    turn = np.array([[c, -s], [s, c]])
+    step = body_covariance(Edge(0, 1, pose(1.0, 0.0, 0.3), long, "odometry"))
+    back = np.array([[math.cos(0.3), -math.sin(0.3)], [math.sin(0.3), math.cos(0.3)]])
+    assert open_end[1, :2, :2] == pytest.approx(
+        turn @ back @ step[:2, :2] @ back.T @ turn.T, rel=1e-3, abs=1e-7
+    )
+    closed = chain
+    closed.add_edge(Edge(0, 10, between(chain.poses[0], chain.poses[10]), long, "loop"))
+    assert closed.marginal_covariances()[10].trace() < 0.5 * open_end[10].trace()
+
+
+def test_a_run_that_is_asked_for_marginals_has_them(office: SimulatedDataset) -> None:
+    slam = Slam(load_config(overrides=["graph.marginals=true", "graph.rescan_keyframes=0"]))
+    for _ in slam.run(s for s in office.scans() if s.index < 40):
+        pass
+    result = slam.result()
+    assert result.covariances is not None
+    assert result.covariances.shape == (len(result.keyframes), 3, 3)
+    assert (np.linalg.eigvalsh(result.covariances) > 0.0).all()

@@ -118,7 +118,9 @@ class SlamResult:
     matched : int
         Scans whose pose came from a match, not from odometry.
     seconds : dict
-        Wall time by stage (s): ``track``, ``prepare``, ``loops``, ``graph``, ``final``.
+        Wall time by stage (s), such as ``track``, ``submap``, ``loops``, ``graph``, ``final``, ``rescan``.
+    covariances : float64 (K, 3, 3), optional
+        Of the keyframes' poses in the axes of the map, where ``graph.marginals`` asked for them.
     """
 
     trajectory: Trajectory
@@ -131,3 +133,4 @@ class SlamResult:
     matched: int
     seconds: dict[str, float] = field(default_factory=dict)
     statistics: dict[str, Any] = field(default_factory=dict)
+    covariances: NDArray[np.float64] | None = None

@@ -20,7 +20,7 @@ from hsslam.mapping.picture import write_map_png
 from hsslam.mapping.rosmap import write_rosmap
 from hsslam.slam.events import SlamResult
 from hsslam.slam.journal import Header, Journal, Replay, read_journal
-from hsslam.slam.loop_table import write_loops
+from hsslam.slam.run_tables import write_covariances, write_loops
 
 JOURNAL = "journal.jsonl"
 FILES = (
@@ -145,6 +145,8 @@ class RunFolder:
         write_tum(self.path / "odometry.tum", result.odometry)
         write_tum(self.path / "online.tum", result.online)
         write_loops(self.path / "loops.csv", result.loops)
+        if result.covariances is not None:
+            write_covariances(self.path / "covariances.csv", result)
         write_g2o(
             self.path / "graph.g2o",
             result.keyframe_poses,

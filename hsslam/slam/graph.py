@@ -112,18 +112,41 @@ class PoseGraph:
         (float, float, bool (E,))
             Nonlinear error before and after, and which of `edges` the solution does not believe.
         """
-        graph = gtsam.NonlinearFactorGraph()
-        graph.add(_prior(self._start))
         loss = self._config.robust if robust else "none"
-        for edge in self.edges:
-            graph.add(self._factor(edge, loss == "cauchy"))
-        values = gtsam.Values()
-        for key, pose in enumerate(self.poses):
-            values.insert(key, _pose2(pose))
+        graph, values = self._problem(loss == "cauchy")
         before = graph.error(values)
         solution = self._solve(graph, values, loss)
         self._take(solution)
         return before, graph.error(solution), self._disbelieved()
+
+    def marginal_covariances(self) -> NDArray[np.float64]:
+        """Covariance of every keyframe's pose in the axes of the map, (K, 3, 3), all other poses being unknown.
+
+        Raises
+        ------
+        GraphError
+            The constraints leave a pose open.
+        """
+        graph, values = self._problem(self._config.robust == "cauchy")
+        try:
+            marginals = gtsam.Marginals(graph, values)
+            found = [marginals.marginalCovariance(key) for key in range(self._count)]
+        except RuntimeError as error:
+            raise GraphError(f"the constraints do not fix every pose: {error}") from error
+        # GTSAM speaks of the frame of the pose itself.
+        return np.array(
+            [rotated(c, -theta) for c, theta in zip(found, self.poses[:, 2], strict=True)]
+        ).reshape(-1, 3, 3)
+
+    def _problem(self, robust: bool) -> tuple[Any, Any]:
+        graph = gtsam.NonlinearFactorGraph()
+        graph.add(_prior(self._start))
+        for edge in self.edges:
+            graph.add(self._factor(edge, robust))
+        values = gtsam.Values()
+        for key, pose in enumerate(self.poses):
+            values.insert(key, _pose2(pose))
+        return graph, values
 
     def _solve(self, graph: Any, values: Any, loss: str) -> Any:
         lm = gtsam.LevenbergMarquardtParams()

@@ -172,6 +172,7 @@ class Slam:
             matched=self._matched,
             seconds=dict(self._stopwatch.seconds),
             statistics={"evaluations": self._evaluations},
+            covariances=graph.marginal_covariances() if self._config.graph.marginals else None,
         )
 
     def _close_loops(self) -> Iterator[Event]:

@@ -1,4 +1,4 @@
-"""Every loop that was tried, as a table: what was found, what was thought of it, why it was refused."""
+"""Tables of a run: every loop that was tried and what was thought of it; how well every keyframe is known."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hsslam.io.atomic import atomic_path
-from hsslam.slam.events import LoopChecked
+from hsslam.slam.events import LoopChecked, SlamResult
 
 COLUMNS = (
     "first",
@@ -56,3 +56,18 @@ def write_loops(path: Path | str, loops: Sequence[LoopChecked]) -> None:
                     loop.evaluations,
                 )
             )
+
+
+def write_covariances(path: Path | str, result: SlamResult) -> None:
+    """Write the covariances of the keyframes' poses, upper triangles in the axes of the map, into a CSV file."""
+    assert result.covariances is not None
+    with (
+        atomic_path(path) as temporary,
+        temporary.open("w", encoding="utf-8", newline="") as file,
+    ):
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(("keyframe", "scan", "xx", "xy", "xtheta", "yy", "ytheta", "thetatheta"))
+        rows = zip(result.keyframes, result.covariances, strict=True)
+        for keyframe, (scan, c) in enumerate(rows):
+            triangle = (c[0, 0], c[0, 1], c[0, 2], c[1, 1], c[1, 2], c[2, 2])
+            table.writerow((keyframe, scan.index, *(f"{value:.6e}" for value in triangle)))
