@@ -51,12 +51,12 @@ def parameter_page() -> str:
     hsslam.errors.MatcherUnavailableError
         A matcher of hsslam's own cannot be loaded: its parameters would be missing.
     """
-    parts = [HEAD]
-    sections = groupby(_rows(Config), key=lambda row: row[0].partition(".")[0] if "." in row[0] else "")
-    for name, rows in sections:
-        model = Config.model_fields[name].annotation if name else None
-        if name != "matcher":
-            parts += [*_heading(name, model), _table(rows)]
+    # The rest of a matcher's parameters are its own, below.
+    rows = [(name.removesuffix(".name"), *told) for name, *told in _rows(Config)]
+    parts = [HEAD, _table(row for row in rows if "." not in row[0])]
+    nested = (row for row in rows if "." in row[0])
+    for name, section in groupby(nested, key=lambda row: row[0].partition(".")[0]):
+        parts += [*_heading(name, Config.model_fields[name].annotation), _table(section)]
     parts.append(MATCHERS)
     for name in registry.names():
         if registry.origin(name) == "hsslam":
