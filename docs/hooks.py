@@ -42,8 +42,7 @@ def root_page(text: str) -> str:
     """A document of the root, its links seen from this folder."""
     for page, source in PAGES.items():
         text = text.replace(f"]({source})", f"]({page})")
-    text = text.replace(" · BSD 3-Clause, see [LICENSE](LICENSE)", "").replace("](LICENSE)", "](start.md)")
-    return text.replace("](docs/", "](")
+    return text.replace("[LICENSE](LICENSE)", "LICENSE").replace("](docs/", "](")
 
 
 def notebook_page(notebook: Path) -> str:

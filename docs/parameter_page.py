@@ -83,6 +83,6 @@ def _heading(name: str, model: type[BaseModel] | None) -> list[str]:
 def _table(rows: Iterable[Row]) -> str:
     lines = ["| parameter | type | default | range | meaning |", "|---|---|---|---|---|"]
     for name, kind, default, extent, meaning in rows:
-        told = (f"`{name}`", kind, f"`{default}`" if default else "", extent, meaning)
+        told = (f"`{name}`", kind, f"`{default}`" if default else "", extent.replace(" ", "\u00a0"), meaning)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in told) + " |")
     return "\n".join(lines)
