@@ -35,11 +35,18 @@ def solve(world: str) -> SlamResult:
 
 
 def draw_map(path: Path, world: str, result: SlamResult) -> None:
-    """A map with the robot's way and its loops."""
+    """A map with the robot's way and its loops, as a run folder has it."""
     places = result.keyframe_poses
-    loops = [(*places[loop.first, :2], *places[loop.second, :2]) for loop in result.loops if loop.accepted]
-    grid = build_grid(result.keyframes, places)
-    write_map_png(path, grid, result.trajectory, loops, f"{world}, {len(result.trajectory)} scans", dpi=DPI)
+    ties = [(loop, (*places[loop.first, :2], *places[loop.second, :2])) for loop in result.loops]
+    write_map_png(
+        path,
+        build_grid(result.keyframes, places),
+        result.trajectory,
+        [ends for loop, ends in ties if loop.accepted],
+        f"{world}, {len(result.trajectory)} scans",
+        refused=[ends for loop, ends in ties if loop.contested],
+        dpi=DPI,
+    )
 
 
 def draw_odometry(path: Path, world: str, result: SlamResult) -> None:
