@@ -1,0 +1,147 @@
+"""Does SLAM slow down? The simulated office driven round and round, and the time each scan takes.
+
+    python eval/benchmarks/long_run.py [--scans 100000] [--block 1000] [--set KEY=VALUE ...] [--png FILE] [--json FILE]
+
+Prints a row per block of scans: processor time per scan (median and mean), seconds per stage, keyframes, loops and peak
+memory; at the end how much longer a scan of the last tenth took than one of the first. Kernels are compiled before
+the clock starts. The online pass alone is timed: what `finish` does runs once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import statistics
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from hsslam.config import Config, load_config
+from hsslam.datasets.simulator import SimulatedDataset
+from hsslam.slam.events import KeyframeAdded, LoopChecked
+from hsslam.slam.pipeline import Slam
+
+
+@dataclass(frozen=True)
+class Block:
+    """What some scans in a row cost: processor time per scan (ms), wall time by stage (s)."""
+
+    last_scan: int
+    median_ms: float
+    mean_ms: float
+    seconds: dict[str, float]
+    keyframes: int
+    loops: int
+    accepted: int
+    peak_mb: float
+
+
+def drive(config: Config, scans: int, block: int, seed: int) -> Iterator[Block]:
+    """Run the online pass over the office, driven round until there are enough scans; a `Block` at a time."""
+    warm = Slam(config)
+    for scan in SimulatedDataset("office", seed=seed + 1, scans=400).scans():
+        warm.process(scan)
+    slam = Slam(config)
+    times: list[float] = []
+    keyframes = loops = accepted = 0
+    before: dict[str, float] = {}
+    for scan in SimulatedDataset("office", seed=seed, scans=scans).scans():
+        began = time.process_time()
+        events = slam.process(scan)
+        times.append(1e3 * (time.process_time() - began))
+        keyframes += sum(isinstance(event, KeyframeAdded) for event in events)
+        checked = [event for event in events if isinstance(event, LoopChecked)]
+        loops, accepted = loops + len(checked), accepted + sum(loop.accepted for loop in checked)
+        if len(times) == block:
+            now = slam.result().seconds
+            stages = {stage: seconds - before.get(stage, 0.0) for stage, seconds in now.items()}
+            before = now
+            yield Block(
+                scan.index,
+                statistics.median(times),
+                statistics.fmean(times),
+                stages,
+                keyframes,
+                loops,
+                accepted,
+                peak_megabytes(),
+            )
+            times = []
+
+
+def peak_megabytes() -> float:
+    """Largest resident memory of this process so far (MB)."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1 << 20) if sys.platform == "darwin" else peak / 1024
+
+
+def growth(blocks: list[Block]) -> tuple[float, float]:
+    """Time per scan of the last tenth over that of the first: of medians, and of means."""
+    tenth = max(len(blocks) // 10, 1)
+    start, end = blocks[:tenth], blocks[-tenth:]
+    return (
+        statistics.fmean(b.median_ms for b in end) / statistics.fmean(b.median_ms for b in start),
+        statistics.fmean(b.mean_ms for b in end) / statistics.fmean(b.mean_ms for b in start),
+    )
+
+
+def draw(blocks: list[Block], path: Path) -> None:
+    """Plot time per scan, whole and by stage, against the number of scans."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8, 6), layout="constrained")
+    whole, stages = figure.subplots(2, 1, sharex=True)
+    scans = [(block.last_scan + 1) / 1e3 for block in blocks]
+    whole.plot(scans, [block.mean_ms for block in blocks], label="mean")
+    whole.plot(scans, [block.median_ms for block in blocks], label="median")
+    whole.set(ylabel="processor time per scan (ms)", ylim=(0, None))
+    whole.legend()
+    size = blocks[0].last_scan + 1
+    for stage in sorted({stage for block in blocks for stage in block.seconds}):
+        stages.plot(scans, [1e3 * block.seconds.get(stage, 0.0) / size for block in blocks], label=stage)
+    stages.set(xlabel="thousand scans", ylabel="wall time per scan by stage (ms)", ylim=(0, None))
+    stages.legend()
+    figure.savefig(path, dpi=120)
+
+
+def main() -> None:
+    """Run, print the table, draw."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--scans", type=int, default=100_000)
+    parser.add_argument("--block", type=int, default=1000, help="scans per row")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE")
+    parser.add_argument("--png", type=Path, help="where to plot")
+    parser.add_argument("--json", type=Path, help="where to keep the figures")
+    arguments = parser.parse_args()
+    config = load_config(overrides=[f"seed={arguments.seed}", *arguments.settings])
+    blocks: list[Block] = []
+    print("   scans median ms mean ms keyframes   loops accepted peak MB  stages (ms per scan)")
+    for block in drive(config, arguments.scans, arguments.block, arguments.seed):
+        blocks.append(block)
+        stages = " ".join(
+            f"{stage} {1e3 * seconds / arguments.block:.3f}" for stage, seconds in sorted(block.seconds.items())
+        )
+        print(
+            f"{block.last_scan + 1:8} {block.median_ms:9.3f} {block.mean_ms:7.3f} {block.keyframes:9} "
+            f"{block.loops:7} {block.accepted:8} {block.peak_mb:7.0f}  {stages}",
+            flush=True,
+        )
+    if not blocks:
+        raise SystemExit(f"--scans {arguments.scans} is less than one block of {arguments.block}")
+    medians, means = growth(blocks)
+    print(f"last tenth over first tenth: median x {medians:.2f}, mean x {means:.2f} (seed {arguments.seed})")
+    if arguments.png:
+        draw(blocks, arguments.png)
+    if arguments.json:
+        figures = {"seed": arguments.seed, "median_ratio": medians, "mean_ratio": means}
+        arguments.json.write_text(
+            json.dumps({**figures, "blocks": [asdict(block) for block in blocks]}, indent=1), encoding="utf-8"
+        )
+
+
+if __name__ == "__main__":
+    main()
