@@ -1,0 +1,108 @@
+"""The motion model alone, and whole runs on logs whose odometry fell silent."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hsslam.config import Config, GraphSection
+from hsslam.datasets.simulator import SimulatedDataset
+from hsslam.scan import LaserScan, ScanGeometry
+from hsslam.se2 import between_many, compose, pose
+from hsslam.slam.motion import REST_STD_XY, MotionModel
+from hsslam.slam.pipeline import Slam
+
+RULES = GraphSection()
+
+
+def scan(stamp: float, odometry: NDArray[np.float64]) -> LaserScan:
+    return LaserScan(stamp, np.full(3, 1.0), ScanGeometry(0.0, 0.1), odometry=odometry)
+
+
+def silent_model(step: NDArray[np.float64], seconds: float = 0.25) -> MotionModel:
+    """A model that saw three scans move by ``step`` while odometry said nothing."""
+    model = MotionModel(RULES)
+    model.start(scan(0.0, np.zeros(3)))
+    for i in range(1, 4):
+        model.observe(scan(i * seconds, np.zeros(3)), step)
+    return model
+
+
+def test_odometry_is_the_prediction_in_the_frame_of_the_last_scan() -> None:
+    model = MotionModel(RULES)
+    start, step = pose(3.0, -2.0, 2.0), pose(0.4, 0.1, 0.2)
+    model.start(scan(0.0, start))
+    moved, covariance = model.predict(scan(0.1, compose(start, step)))
+    assert moved == pytest.approx(step)
+    travel = math.hypot(0.4, 0.1) + 0.2
+    assert covariance[0, 0] == pytest.approx((RULES.odometry_std_xy * travel) ** 2 + REST_STD_XY**2)
+    assert np.linalg.eigvalsh(covariance)[0] > 0.0
+
+
+def test_a_robot_at_rest_is_not_an_outage() -> None:
+    model = silent_model(np.array([0.001, 0.0, 0.0]))
+    assert not model.silent
+    assert model.predict(scan(1.0, np.zeros(3)))[0] == pytest.approx(np.zeros(3))
+
+
+def test_the_last_motion_stands_in_until_odometry_speaks_again() -> None:
+    step = pose(0.15, 0.0, 0.05)
+    model = silent_model(step)
+    assert model.silent
+    assert model.last_motion == pytest.approx(step)
+    moved, covariance = model.predict(scan(1.0, np.zeros(3)))
+    assert moved == pytest.approx(step)
+    assert covariance[0, 0] > model.covariance(step)[0, 0]
+    model.observe(scan(1.0, pose(0.1, 0.0, 0.0)), step)
+    assert not model.silent
+    again, _ = model.predict(scan(1.25, pose(0.3, 0.0, 0.0)))
+    assert again == pytest.approx(pose(0.2, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "factor"), [(0.5, 2.0), (0.125, 0.5), (100.0, 4.0), (0.0, 1.0), (-3.0, 1.0)]
+)
+def test_the_last_motion_is_stretched_to_the_time_that_passed(seconds: float, factor: float) -> None:
+    """Within limits; and stamps that repeat or step back say nothing."""
+    step = pose(0.1, 0.02, 0.05)
+    moved, _ = silent_model(step).predict(scan(0.75 + seconds, np.zeros(3)))
+    assert moved == pytest.approx(factor * step)
+
+
+def largest_error(result: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
+    def seen(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        return between_many(np.tile(poses[0], (len(poses), 1)), poses)
+
+    return float(np.hypot(*(seen(result) - seen(truth))[:, :2].T).max())
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, 120), (40, 90)])
+def test_slam_goes_on_without_odometry(first: int, last: int) -> None:
+    """Odometry stands still from the start, or in the middle and then goes on from where it stood."""
+    office = SimulatedDataset("office", seed=4, scans=120)
+    odometry = office.odometry.copy()
+    odometry[first:last] = odometry[first]
+    resumed = between_many(np.tile(office.odometry[last - 1], (120 - last, 1)), office.odometry[last:])
+    for i, relative in enumerate(resumed, start=last):
+        odometry[i] = compose(odometry[first], relative)
+    assert largest_error(odometry, office.poses) > 0.5
+
+    def scans() -> Iterator[LaserScan]:
+        for scan in office.scans():
+            yield replace(scan, odometry=odometry[scan.index].copy())
+
+    result = Slam(Config()).solve(scans())
+    assert largest_error(result.trajectory.poses, office.poses) < 0.10
+
+
+def test_stamps_that_repeat_do_no_harm() -> None:
+    office = SimulatedDataset("office", seed=4, scans=60)
+    scans = [replace(s, stamp=float(s.index // 5), odometry=np.zeros(3)) for s in office.scans()]
+    result = Slam(Config()).solve(scans)
+    assert len(result.trajectory) == 60
+    assert largest_error(result.trajectory.poses, office.poses) < 0.10
