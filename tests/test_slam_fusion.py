@@ -20,7 +20,8 @@ def covariances(draw: st.DrawFn) -> Matrix:
     """Positive definite, well conditioned, of the size that covariances of matches have."""
     root = np.array(draw(st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9))).reshape(3, 3)
     scale = draw(st.floats(1e-3, 0.1))
-    return scale**2 * (root @ root.T + 0.1 * np.eye(3))
+    out: Matrix = scale**2 * (root @ root.T + 0.1 * np.eye(3))
+    return out
 
 
 @st.composite

@@ -3,11 +3,11 @@
     python eval/benchmarks/false_loops.py office [--count 50] [--seeds 3] [--set KEY=VALUE ...]
     python eval/benchmarks/false_loops.py intel --data-dir DIR
 
-The log is driven through once; then false loops are put among the true ones before the final optimisation, and the run
-is finished: with a Cauchy loss, with graduated non-convexity, and with no loss. ``random`` loops join any two keyframes by
-any relative pose; ``groups`` of five tell the same falsehood, as a corridor taken for another one does. All claim to be
-as good as a true loop. The error is that of the finished trajectory: against the relations where the dataset has some,
-else the RMS of the absolute error against the exact truth. Within 10 % of the clean run is the aim.
+The log is driven through once; then false loops are put among the true ones before the final optimisation, and the
+run is finished: with a Cauchy loss, with graduated non-convexity, and with no loss. ``random`` loops join any two
+keyframes by any relative pose; ``groups`` of five tell the same falsehood, as a corridor taken for another one does.
+All claim to be as good as a true loop. The error is that of the finished trajectory: against the relations where the
+dataset has some, else the RMS of the absolute error against the exact truth. Within 10 % of the clean run is the aim.
 """
 
 from __future__ import annotations

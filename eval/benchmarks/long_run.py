@@ -123,7 +123,8 @@ def main() -> None:
     for block in drive(config, arguments.scans, arguments.block, arguments.seed):
         blocks.append(block)
         stages = " ".join(
-            f"{stage} {1e3 * seconds / arguments.block:.3f}" for stage, seconds in sorted(block.seconds.items())
+            f"{stage} {1e3 * seconds / arguments.block:.3f}"
+            for stage, seconds in sorted(block.seconds.items())
         )
         print(
             f"{block.last_scan + 1:8} {block.median_ms:9.3f} {block.mean_ms:7.3f} {block.keyframes:9} "
