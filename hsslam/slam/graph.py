@@ -24,12 +24,13 @@ FLOOR_STD_THETA = math.radians(0.1)
 """No relative pose is trusted beyond this: errors that matches share do not show in their covariances."""
 
 
-UPDATE_EVERY = 15
-"""Loops that change next to nothing are gathered; after so many of them the estimate is brought up to date."""
+NEXT_TO_NOTHING_XY = 0.02
+NEXT_TO_NOTHING_THETA = math.radians(0.3)
+"""A loop that disagrees with the estimate by less than this (m, rad) is left to the optimisation at the end.
 
-NEXT_TO_NOTHING_XY = 0.03
-NEXT_TO_NOTHING_THETA = math.radians(0.5)
-"""A loop that disagrees with the estimate by less than this (m, rad) changes next to nothing."""
+A robot that drives the same rounds closes a loop at nearly every keyframe. Were they all in iSAM2, the work per scan
+would grow with the log. An error that is still too small to matter grows until a loop shows it.
+"""
 
 
 class GraphError(HsslamError):
@@ -54,7 +55,7 @@ class PoseGraph:
         self._config = config
         self._start = start
         self.uncertainty = RelativeUncertainty()
-        self._loops_waiting = 0
+        self._loop_waits = False
         self.edges: list[Edge] = []
         self._poses = np.empty((1024, 3))
         self._poses[0] = start
@@ -93,12 +94,12 @@ class PoseGraph:
 
     @property
     def wants_update(self) -> bool:
-        """Whether loops that came since the last `update` change the estimate enough to be worth one."""
-        return self._loops_waiting >= UPDATE_EVERY
+        """Whether a loop that came since the last `update` changes the estimate enough to be worth one."""
+        return self._loop_waits
 
     def update(self) -> None:
         """Bring the estimate up to date with iSAM2."""
-        self._loops_waiting = 0
+        self._loop_waits = False
         self._isam.update(self._new_factors, self._new_values)
         self._new_factors = gtsam.NonlinearFactorGraph()
         self._new_values = gtsam.Values()
@@ -185,10 +186,9 @@ class PoseGraph:
             self.uncertainty.add(edge.first, edge.second, spread, covariance[2, 2])
         if edge.kind == "loop":
             error = between(edge.relative, between(self._poses[edge.first], self._poses[edge.second]))
-            small = (
-                math.hypot(error[0], error[1]) < NEXT_TO_NOTHING_XY and abs(error[2]) < NEXT_TO_NOTHING_THETA
-            )
-            self._loops_waiting += 1 if small else UPDATE_EVERY
+            if math.hypot(error[0], error[1]) < NEXT_TO_NOTHING_XY and abs(error[2]) < NEXT_TO_NOTHING_THETA:
+                return
+            self._loop_waits = True
         self._new_factors.add(self._factor(edge, edge.kind != "odometry" and self._config.robust != "none"))
 
     def _factor(self, edge: Edge, robust: bool) -> Any:
