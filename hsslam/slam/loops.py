@@ -25,6 +25,9 @@ from hsslam.slam.uncertainty import RelativeUncertainty
 REFERENCES_KEPT = 10
 """Prepared submaps kept for the next candidates; a robot that comes back passes several of them in a row."""
 
+NEAREST = 200
+"""Keyframes looked at, at most: with every round through a building there are more near by, and they tell no more."""
+
 SIGMAS = 3.0
 """A window reaches this many standard deviations to either side."""
 
@@ -92,7 +95,7 @@ class LoopCloser:
         near = np.flatnonzero(distances <= rules.radius + 2.0 * self._widest.half_x)
         if len(near) == 0:
             return []
-        near = near[np.argsort(distances[near], kind="stable")]
+        near = near[np.argsort(distances[near], kind="stable")][:NEAREST]
         with self._stopwatch.measure("candidates"):
             variances = uncertainty.seen_from(newest, near, poses)
         chosen: list[Candidate] = []
