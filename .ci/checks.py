@@ -23,7 +23,8 @@ def comparison(folder: Path) -> Iterator[str]:
     if missing:
         yield f"{folder}: expected {', '.join(REPORT_FILES)}, missing {', '.join(missing)}"
         return
-    outcomes = {m["name"]: m for m in json.loads((folder / "comparison.json").read_text())["matchers"]}
+    compared = json.loads((folder / "comparison.json").read_text())["comparisons"]
+    outcomes = {m["name"]: m for comparison in compared for m in comparison["matchers"]}
     rows = {name: csv.DictReader((folder / name).read_text().splitlines()) for name in TABLES}
     told = {name: {row["matcher"]: row["status"] for row in reader} for name, reader in rows.items()}
     html, markdown = ((folder / name).read_text() for name in ("report.html", "report.md"))
@@ -34,8 +35,11 @@ def comparison(folder: Path) -> Iterator[str]:
             continue
         for failure in outcome["failures"]:
             yield f"{name}: {failure['stage']}: {failure['reason']}"
-        if outcome["slam"] is not None and not (folder / outcome["slam"]["folder"] / "map.png").is_file():
-            yield f"{name}: no map in {outcome['slam']['folder']}"
+        if not outcome["runs"]:
+            yield f"{name}: no SLAM"
+        for run in outcome["runs"]:
+            if not (folder / run["folder"] / "map.png").is_file():
+                yield f"{name}: no map in {run['folder']}"
         for table in TABLES:
             if told[table].get(name) != "done":
                 yield f"{name}: {told[table].get(name, 'no row')} in {table}"
