@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,22 +28,23 @@ def write_csv_files(study: Study, folder: Path) -> list[Path]:
             gone = failures.get("unavailable")
             if comparison.config.get("run_trials", False):
                 status = gone or failures.get("trials", "done")
-                row = _trials(matcher.trials) if matcher.trials is not None else {}
+                row = trials_figures(matcher.trials) if matcher.trials is not None else {}
                 trials.append({**whose, "status": status, **row})
             if matcher.trials is not None:
                 raw += ({**whose, **row} for row in _raw(matcher.trials))
             if comparison.config.get("run_slam", True):
-                slam += ({**whose, "status": "done", **_slam(run)} for run in matcher.runs)
+                slam += ({**whose, "status": "done", **slam_figures(run)} for run in matcher.runs)
                 slam += (
                     {**whose, "status": failure.reason, "seed": failure.seed}
                     for failure in matcher.failures
                     if failure.stage in ("slam", "unavailable")
                 )
     files = {"trials.csv": trials, "trials_raw.csv": raw, "slam.csv": slam}
-    return [_write(folder / name, rows) for name, rows in files.items() if rows]
+    return [write_rows(folder / name, rows) for name, rows in files.items() if rows]
 
 
-def _trials(trials: MatcherTrials) -> dict[str, Any]:
+def trials_figures(trials: MatcherTrials) -> dict[str, Any]:
+    """Every figure of a matcher's trials, by its column."""
     row: dict[str, Any] = {
         "protocol": trials.protocol,
         "trials": trials.count,
@@ -80,7 +81,8 @@ def _raw(trials: MatcherTrials) -> Iterator[dict[str, Any]]:
         }
 
 
-def _slam(slam: SlamOutcome) -> dict[str, Any]:
+def slam_figures(slam: SlamOutcome) -> dict[str, Any]:
+    """Every figure of a SLAM run, by its column."""
     return {
         "seed": slam.seed,
         "scans": slam.scans,
@@ -120,8 +122,9 @@ def _spread(name: str, unit: str, spread: Spread) -> dict[str, float]:
     }
 
 
-def _write(path: Path, rows: list[dict[str, Any]]) -> Path:
-    headings = list(dict.fromkeys(key for row in rows for key in row))
+def write_rows(path: Path, rows: Sequence[Mapping[str, Any]], first: Sequence[str] = ()) -> Path:
+    """Write rows that may have different columns; those named ``first`` come first, the others as they occur."""
+    headings = list(dict.fromkeys([*first, *(key for row in rows for key in row)]))
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, headings, restval="")
         writer.writeheader()

@@ -23,6 +23,7 @@ from hsslam.cli import (
     report,
     reproduce,
     run,
+    sweep,
 )
 from hsslam.errors import HsslamError
 from hsslam.version import __version__
@@ -70,6 +71,7 @@ def hsslam(
 app.command("init")(init.init)
 app.command("run")(run.run)
 app.command("compare", cls=compare.ManyNames)(compare.compare)
+app.command("sweep")(sweep.sweep)
 app.command("report")(report.report)
 app.command("match")(match.match)
 app.command("eval")(evaluate.evaluate)
