@@ -2,7 +2,7 @@
 
 A sweep's folder::
 
-    sweep.yaml       the resolved settings
+    resolved.yaml    every setting
     jobs/NAME/       a job's folder, see `hsslam_eval.jobs`, and ``worker.json``: where it was done
     sweep.csv        a row for each job
     sweep.json       the same
@@ -11,6 +11,7 @@ A sweep's folder::
 from __future__ import annotations
 
 import json
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,11 +26,11 @@ from hsslam.version import __version__
 from hsslam_eval.comparison import Failure, MatcherTrials, SlamOutcome
 from hsslam_eval.jobs import RESULT_FILE, Job, result_of
 from hsslam_eval.sweep_config import Point, SweepConfig, expand
-from hsslam_eval.sweep_pool import open_pool
+from hsslam_eval.sweep_pool import Ended, open_pool
 from hsslam_eval.sweep_table import Row, write_tables
 from hsslam_eval.sweep_worker import WORKER_FILE, order, unpack
 
-SWEEP_FILE, JOBS_FOLDER = "sweep.yaml", "jobs"
+RESOLVED_FILE, JOBS_FOLDER = "resolved.yaml", "jobs"
 
 _TICK = 0.25
 """How often progress is told where nothing ends (s)."""
@@ -127,31 +128,36 @@ def _run(
 ) -> None:
     """Do jobs, and add what they come to to ``found``."""
     keys, total = list(jobs), len(found) + len(jobs)
+    queue, suspects, running, alone = deque(range(total - len(found))), list[int](), 0, False
     with open_pool(scheduler, min(workers, len(jobs))) as pool:
-        started = running = 0
-        while running or started < len(keys):
+        while queue or running:
             hands = pool.capacity()
-            while started < len(keys) and running < hands:
-                key = keys[started]
-                pool.submit(started, order(jobs[key], places[key].name, config.limits))
-                started, running = started + 1, running + 1
+            while queue and running < (min(hands, 1) if alone else hands):
+                number, running = queue.popleft(), running + 1
+                key = keys[number]
+                pool.submit(number, order(jobs[key], places[key].name, config.limits))
             failed = sum(isinstance(result, Failure) for result in found.values())
             tell(Status(len(found) - failed, failed, total, hands))
             ended = pool.next(_TICK)
             if ended is None:
                 continue
-            number, came = ended
             running -= 1
-            key = keys[number]
-            found[key] = _received(jobs[key], places[key], came)
+            if ended.worker_died and not alone:
+                suspects.append(ended.number)
+            else:
+                key = keys[ended.number]
+                found[key] = _received(jobs[key], places[key], ended)
+            if not queue and not running and suspects and not alone:
+                # Of several jobs that a worker had, one may have taken it down: who does so alone, is guilty.
+                queue, alone = deque(suspects), True
 
 
-def _received(job: Job, place: Path, came: dict[str, Any] | str) -> MatcherTrials | SlamOutcome | Failure:
-    if isinstance(came, str):
-        return Failure(job.kind, came, "", job.seed)
-    unpack(came["files"], place)
-    if came["failure"] is not None:
-        return Failure(**came["failure"])
+def _received(job: Job, place: Path, ended: Ended) -> MatcherTrials | SlamOutcome | Failure:
+    if ended.result is None:
+        return Failure(job.kind, ended.reason, "", job.seed)
+    unpack(ended.result["files"], place)
+    if ended.result["failure"] is not None:
+        return Failure(**ended.result["failure"])
     result = result_of(job, place)
     assert result is not None
     return result
@@ -170,14 +176,14 @@ def _prepare(out: Path, config: SweepConfig) -> Path:
         held = sorted(item.name for item in out.iterdir())
     except OSError as error:
         raise DataError(f"{out}: the folder cannot be made: {error.strerror}") from error
-    if held and SWEEP_FILE not in held:
+    if held and RESOLVED_FILE not in held:
         raise DataError(f"{out}: holds something else than a sweep ({held[0]}); choose another folder")
     about = {
         "version": __version__,
         "plugins": plugin_files.fingerprints(),
         "config": config.resolved(),
     }
-    with atomic_path(out / SWEEP_FILE) as temporary:
+    with atomic_path(out / RESOLVED_FILE) as temporary:
         temporary.write_text(yaml.safe_dump(about, sort_keys=False), encoding="utf-8")
     return out
 

@@ -80,6 +80,16 @@ class SweepConfig(CompareConfig):
                 raise ValueError(f"grid.{key}: would change nothing, as run_{kind} is off")
         return self
 
+    def resolved(self) -> dict[str, Any]:
+        """Every setting as plain data; what has its place elsewhere left out."""
+        data = super().resolved()
+        for item, spec in zip(data["datasets"], self.datasets, strict=True):
+            item["seed"] = _seed_of(spec, self.seed)
+            item.pop("data_dir")
+        if not self.grid:
+            data.pop("grid")
+        return data
+
 
 @dataclass(frozen=True)
 class Point:
@@ -149,13 +159,18 @@ def _kinds(config: CompareConfig) -> Iterator[Kind]:
 
 
 def _located(spec: DatasetSpec, seed: int, data_dir: Path | None) -> DatasetSpec:
-    """A dataset's own seed, or that of the sweep; a log by its full path, as workers start in other folders."""
+    """A dataset with its own seed or that of the sweep, a log by its full path: workers start in other folders."""
     from hsslam.datasets.catalogue import join_source, names
 
     if spec.name not in names():
         spec.open()
-    chosen = spec.seed if "seed" in spec.model_fields_set else seed
-    return spec.model_copy(update={"name": join_source(spec.name), "seed": chosen, "data_dir": data_dir})
+    return spec.model_copy(
+        update={"name": join_source(spec.name), "seed": _seed_of(spec, seed), "data_dir": data_dir}
+    )
+
+
+def _seed_of(spec: DatasetSpec, seed: int) -> int:
+    return spec.seed if "seed" in spec.model_fields_set else seed
 
 
 def _single(

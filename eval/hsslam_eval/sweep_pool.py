@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from queue import Empty, Queue
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
@@ -25,6 +25,11 @@ INSTALL = "pip install 'hsslam[sweep]'"
 CONNECT_SECONDS = 20.0
 """How long a scheduler may take to answer (s)."""
 
+_GONE = "the scheduler went away, or dropped the jobs; what is done is kept, the same command goes on with it"
+
+_LOCAL_SETTINGS = {"distributed.scheduler.allowed-failures": 1}
+"""A job whose worker died gets another one, once; a cluster's scheduler has its own setting."""
+
 # Ctrl-C in a terminal reaches every process of its group; workers leave it to the one that started them.
 _DEAF = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 
@@ -33,6 +38,28 @@ class SweepError(HsslamError):
     """Jobs cannot be handed out."""
 
     exit_code = 5
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A job that is no longer at work.
+
+    Parameters
+    ----------
+    number : int
+        The one it was handed out with.
+    result : dict or None
+        What `hsslam_eval.sweep_worker.do` returned.
+    reason : str
+        Why there is no result.
+    worker_died : bool
+        Whether that is because its workers died; perhaps another job of theirs was to blame.
+    """
+
+    number: int
+    result: dict[str, Any] | None = None
+    reason: str = ""
+    worker_died: bool = False
 
 
 class Pool:
@@ -60,14 +87,8 @@ class Pool:
         self._running[number] = future
         future.add_done_callback(lambda ended: self._ended.put((number, ended)))
 
-    def next(self, timeout: float) -> tuple[int, dict[str, Any] | str] | None:
-        """Wait for a job to end.
-
-        Returns
-        -------
-        tuple of int and (dict or str), or None
-            Its number and what `hsslam_eval.sweep_worker.do` returned, or the reason why there is nothing;
-            None where none ended in time.
+    def next(self, timeout: float) -> Ended | None:
+        """Wait for a job to end; None where none did in time (s).
 
         Raises
         ------
@@ -80,18 +101,19 @@ class Pool:
             number, future = self._ended.get(timeout=timeout)
         except Empty:
             if self._client.status not in ("running", "connecting"):
-                raise SweepError("the scheduler went away; what is done is kept") from None
+                raise SweepError(_GONE) from None
             return None
         del self._running[number]
         if future.status in ("cancelled", "lost"):
-            raise SweepError("the scheduler went away, or dropped the jobs; what is done is kept")
+            raise SweepError(_GONE)
         error = future.exception()
         if error is None:
-            result: dict[str, Any] = future.result()
-            return number, result
+            return Ended(number, future.result())
         if isinstance(error, KilledWorker):
-            return number, f"its worker died, {error.allowed_failures + 1} times; not tried again"
-        return number, " ".join(f"{type(error).__name__}: {error}".split())
+            times = error.allowed_failures + 1
+            reason = f"its worker died, {times} times in a row" if times > 1 else "its worker died"
+            return Ended(number, reason=reason, worker_died=True)
+        return Ended(number, reason=" ".join(f"{type(error).__name__}: {error}".split()))
 
     def cancel(self) -> None:
         """Take back what is handed out."""
@@ -115,12 +137,14 @@ def open_pool(scheduler: str | None, workers: int) -> Iterator[Pool]:
         Dask is not installed, or the scheduler does not answer.
     """
     try:
+        import dask
         from distributed import Client, LocalCluster
     except ImportError as error:
         raise SweepError(f"a sweep needs the library distributed: {INSTALL}") from error
     with ExitStack() as stack:
         try:
             if scheduler is None:
+                stack.enter_context(dask.config.set(_LOCAL_SETTINGS))
                 place: Any = stack.enter_context(
                     LocalCluster(
                         n_workers=workers,

@@ -96,7 +96,10 @@ def read(file: Path) -> SweepConfig:
     listed = data.get("matchers")
     items = listed if isinstance(listed, list) else []
     registry.quarantine(str(item.get("name") if isinstance(item, dict) else item) for item in items)
-    return validate(SweepConfig, data, source=str(file))
+    try:
+        return validate(SweepConfig, data)
+    except ConfigError as error:
+        raise ConfigError(f"{file}: {error}") from error
 
 
 class Tell:
