@@ -110,6 +110,14 @@ def figures(out: Path, *matchers: str) -> list[dict[str, Any]]:
     ]
 
 
+def jobs_at_work(scratch: Path) -> list[str]:
+    """Processes of jobs in the folder of a cluster's workers."""
+    listed = subprocess.run(["ps", "-A", "-ww", "-o", "args"], capture_output=True, text=True, check=True)
+    return [
+        line for line in listed.stdout.splitlines() if "hsslam_eval.worker" in line and f"{scratch}/" in line
+    ]
+
+
 @pytest.fixture(scope="module")
 def plugin(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     file = tmp_path_factory.mktemp("plugin") / "ill_bred.py"
@@ -269,6 +277,7 @@ def test_a_cluster_gives_the_same_and_survives_the_death_of_workers(
             process(*command, str(file), "--scheduler", address, "--out", str(tmp_path / "out"))
         )
         wait_for(marker)
+        assert any("sweep_waits_once" in job for job in jobs_at_work(scratch))
         os.kill(int(marker.read_text()), signal.SIGKILL)
         assert running.wait(PATIENCE) == 0
         sweep(whole, "--scheduler", address, "--out", tmp_path / "out2")
@@ -292,3 +301,4 @@ def test_a_cluster_gives_the_same_and_survives_the_death_of_workers(
                 assert here.read_bytes() == there.read_bytes(), name
     missing = [row["reason"] for row in rows(tmp_path / "out2") if row["dataset"] == "intel"]
     assert len(missing) == 4 and all(f"{data}" in reason for reason in missing)
+    assert jobs_at_work(scratch) == []

@@ -7,8 +7,10 @@ the same (out of memory, machine gone), Dask gives its job to another, a few tim
 from __future__ import annotations
 
 import logging
+import os
+import signal
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from queue import Empty, Queue
 from typing import TYPE_CHECKING, Any
@@ -18,7 +20,7 @@ from hsslam.errors import HsslamError
 from hsslam_eval.sweep_worker import Order, do
 
 if TYPE_CHECKING:
-    from distributed import Client, Future
+    from distributed import Client, Future, LocalCluster
 
 INSTALL = "pip install 'hsslam[sweep]'"
 
@@ -168,5 +170,18 @@ def open_pool(scheduler: str | None, workers: int) -> Iterator[Pool]:
         pool = Pool(client)
         try:
             yield pool
-        finally:
-            pool.cancel()
+        except BaseException:
+            if scheduler is None:
+                _kill(place)
+            else:
+                pool.cancel()
+            raise
+
+
+def _kill(cluster: LocalCluster) -> None:
+    """End local workers at once: asked to close, they would finish what they do."""
+    for nanny in cluster.workers.values():
+        nanny.auto_restart = False
+        if nanny.pid is not None:
+            with suppress(ProcessLookupError):
+                os.kill(nanny.pid, signal.SIGKILL)

@@ -87,7 +87,7 @@ def do(order: Mapping[str, Any]) -> dict[str, Any]:
     """
     kind, seed = "job", None
     began = perf_counter()
-    with tempfile.TemporaryDirectory(prefix="hsslam-") as scratch:
+    with tempfile.TemporaryDirectory(prefix="hsslam-", dir=_local_directory()) as scratch:
         folder = Path(scratch) / str(order["folder"])
         folder.mkdir()
         try:
@@ -117,6 +117,16 @@ def unpack(files: bytes, folder: Path) -> None:
                 raise HsslamError(f"{name}: a worker sent a file that does not belong into {folder}")
             with atomic_path(target) as temporary:
                 temporary.write_bytes(archive.read(name))
+
+
+def _local_directory() -> str | None:
+    """The worker's own folder, which Dask clears away after a worker that was killed; None outside of a worker."""
+    from distributed import get_worker
+
+    try:
+        return str(get_worker().local_directory)
+    except ValueError:
+        return None
 
 
 def _packed(folder: Path) -> bytes:

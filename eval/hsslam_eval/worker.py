@@ -24,6 +24,7 @@ from hsslam.datasets.dataset import Dataset
 from hsslam.errors import DataError, HsslamError, MatcherUnavailableError
 from hsslam_eval.comparison import Failure, MatcherTrials, SlamOutcome
 from hsslam_eval.jobs import RESULT_FILE, RUN_FOLDER, Job
+from hsslam_eval.orphans import end_with_parent
 from hsslam_eval.record_files import write_record
 
 _REPORT_EVERY = 0.1
@@ -135,6 +136,7 @@ def run_slam_job(job: Job, place: Path, reporter: Reporter) -> SlamOutcome:
 def main(arguments: list[str]) -> int:
     """Do one job; the exit code is 0 where its record was written."""
     folder, reporter = Path(arguments[0]), Reporter(int(arguments[1]))
+    end_with_parent()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash is told in a line, not in a core file
     stage, seed = "trials", 0
     try:
