@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import Config
-from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
+from hsslam.matching.interface import Matcher, Reference, SearchWindow
 from hsslam.se2 import Points, Pose, Poses, between, compose, inverse, wrap
 from hsslam.slam.events import LoopChecked
 from hsslam.slam.fusion import rotated, squared_mahalanobis
 from hsslam.slam.randomness import Purpose, generator
-from hsslam.slam.recovery import best_elsewhere, match_tiles
+from hsslam.slam.recovery import best_elsewhere
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import merge
-from hsslam.slam.tracker import search_window
 from hsslam.slam.uncertainty import RelativeUncertainty
+from hsslam.slam.windows import foreseen_window, match_within, search_window
 
 REFERENCES_KEPT = 10
 """Prepared submaps kept for the next candidates; a robot that comes back passes several of them in a row."""
@@ -28,12 +28,8 @@ REFERENCES_KEPT = 10
 NEAREST = 200
 """Keyframes looked at, at most: with every round through a building there are more near by, and they tell no more."""
 
-SIGMAS = 3.0
-"""A window reaches this many standard deviations to either side."""
-
-LEAST_HALF_XY = 0.15
-LEAST_HALF_THETA = math.radians(5.0)
-"""No window is smaller than this (m, rad): it costs a search little, and covariances may be too small."""
+LEAST = SearchWindow(0.15, 0.15, math.radians(5.0))
+"""No window is smaller than this: it costs a search little, and covariances may be too small."""
 
 ELSEWHERE_XY = 0.5
 ELSEWHERE_THETA = math.radians(15.0)
@@ -164,14 +160,10 @@ class LoopCloser:
         first = candidate.first
         base = place.of(first)
         rng = generator(self._config.seed, Purpose.LOOP, first, second)
-        window = self._window(candidate)
-        result: MatchResult
-        if self._matcher.covers_window or window.half_x <= self._tile.half_x:
-            result = self._matcher.match(place.reference, scan, compose(base, guess), window, rng)
-        else:
-            result = match_tiles(
-                self._matcher, place.reference, scan, compose(base, guess), window, self._tile, rng
-            )
+        window = foreseen_window(candidate.variance_xy, candidate.variance_theta, LEAST, self._widest)
+        result = match_within(
+            self._matcher, place.reference, scan, compose(base, guess), window, self._tile, rng
+        )
         return LoopChecked(
             first=first,
             second=second,
@@ -182,16 +174,6 @@ class LoopCloser:
             score=result.score,
             evaluations=result.evaluations,
             converged=result.converged,
-        )
-
-    def _window(self, candidate: Candidate) -> SearchWindow:
-        half_xy = max(SIGMAS * math.sqrt(candidate.variance_xy), LEAST_HALF_XY)
-        half_theta = max(SIGMAS * math.sqrt(candidate.variance_theta), LEAST_HALF_THETA)
-        widest = self._widest
-        # A few sizes only: what a matcher works out for a window is worth keeping.
-        half_xy, half_theta = (_rounded_up(half_xy), _rounded_up(half_theta))
-        return SearchWindow(
-            min(half_xy, widest.half_x), min(half_xy, widest.half_y), min(half_theta, widest.half_theta)
         )
 
     def _place(self, first: int, points: Sequence[Points], poses: Poses) -> _Place:
@@ -223,11 +205,6 @@ class LoopCloser:
         if largest > rules.max_std:
             return f"standard deviation {largest:.2f} m above {rules.max_std:.2f} m"
         return ""
-
-
-def _rounded_up(value: float) -> float:
-    """To the next power of the square root of 2."""
-    return float(2.0 ** (math.ceil(2.0 * math.log2(value)) / 2.0))
 
 
 def _largest_variance(covariance: NDArray[np.float64]) -> float:

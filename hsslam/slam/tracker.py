@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsslam.config import Config, WindowSection
-from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
+from hsslam.config import Config
+from hsslam.matching.interface import Matcher, MatchResult, Reference
 from hsslam.scan import LaserScan
 from hsslam.se2 import Points, Pose, between, compose
 from hsslam.slam.fusion import fuse, rotated
@@ -19,6 +19,7 @@ from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.recovery import match_tiles
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import LocalSubmap
+from hsslam.slam.windows import foreseen_window, match_within, search_window
 
 RECOVERY_GAIN = 0.1
 """Odometry is overruled only by an answer whose score is this much higher."""
@@ -33,11 +34,6 @@ class TrackedScan:
     score: float
     matched: bool
     evaluations: int
-
-
-def search_window(section: WindowSection) -> SearchWindow:
-    """The window a config section describes."""
-    return SearchWindow(section.half_x, section.half_y, math.radians(section.half_theta_deg))
 
 
 class Tracker:
@@ -58,6 +54,7 @@ class Tracker:
         self._matcher = matcher
         self._stopwatch = stopwatch
         self._window = search_window(config.tracker.window)
+        self._widest = search_window(config.tracker.recovery_window)
         self._submap = LocalSubmap(matcher, config.keyframes.submap_size)
         self._motion = MotionModel(config.graph)
         self._pose: Pose = np.zeros(3)
@@ -115,8 +112,10 @@ class Tracker:
         rules = self._config.tracker
         reference = self._submap.reference
         rng = generator(self._config.seed, Purpose.TRACK, scan.index)
+        # A robot that turns far between two scans may have turned farther than the usual window reaches.
+        window = foreseen_window(max(prior[0, 0], prior[1, 1]), prior[2, 2], self._window, self._widest)
         with self._stopwatch.measure("track"):
-            result = self._matcher.match(reference, points, predicted, self._window, rng)
+            result = match_within(self._matcher, reference, points, predicted, window, self._window, rng)
         if not result.converged or result.score < rules.recovery_score:
             with self._stopwatch.measure("recover"):
                 result = self._recover(reference, points, result, rng)
@@ -141,8 +140,7 @@ class Tracker:
         best = self._matcher.match(reference, points, repeated, self._window, rng)
         evaluations = first.evaluations + best.evaluations
         if not best.converged or best.score < rules.recovery_score:
-            wide = search_window(rules.recovery_window)
-            best = match_tiles(self._matcher, reference, points, repeated, wide, self._window, rng)
+            best = match_tiles(self._matcher, reference, points, repeated, self._widest, self._window, rng)
             evaluations += best.evaluations
         better = best.converged and (not first.converged or best.score > first.score + RECOVERY_GAIN)
         return replace(best if better else first, evaluations=evaluations)

@@ -1,0 +1,59 @@
+"""How far to search: windows of the config, and windows that reach as far as a prediction may be off."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from hsslam.config import WindowSection
+from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
+from hsslam.se2 import Points, Pose
+from hsslam.slam.recovery import match_tiles
+
+SIGMAS = 3.0
+"""A window reaches this many standard deviations to either side."""
+
+
+def search_window(section: WindowSection) -> SearchWindow:
+    """The window a config section describes."""
+    return SearchWindow(section.half_x, section.half_y, math.radians(section.half_theta_deg))
+
+
+def foreseen_window(
+    variance_xy: float, variance_theta: float, least: SearchWindow, most: SearchWindow
+) -> SearchWindow:
+    """The window around a prediction of given variances (m^2, rad^2), between two others along every axis."""
+    xy, theta = SIGMAS * math.sqrt(variance_xy), SIGMAS * math.sqrt(variance_theta)
+    return SearchWindow(
+        _between(xy, least.half_x, most.half_x),
+        _between(xy, least.half_y, most.half_y),
+        _between(theta, least.half_theta, most.half_theta),
+    )
+
+
+def match_within(
+    matcher: Matcher[Any],
+    reference: Reference,
+    points: Points,
+    guess: Pose,
+    window: SearchWindow,
+    tile: SearchWindow,
+    rng: np.random.Generator,
+) -> MatchResult:
+    """Match over a window, tile by tile where it is larger than a tile and more than the matcher can look through."""
+    if matcher.covers_window or bool((window.half <= tile.half).all()):
+        return matcher.match(reference, points, guess, window, rng)
+    return match_tiles(matcher, reference, points, guess, window, tile, rng)
+
+
+def _between(value: float, least: float, most: float) -> float:
+    if value <= least:
+        return least
+    return min(_rounded_up(value), most)
+
+
+def _rounded_up(value: float) -> float:
+    """To the next power of the square root of 2: what a matcher works out for a window is worth keeping."""
+    return float(2.0 ** (math.ceil(2.0 * math.log2(value)) / 2.0))
