@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import Config
-from hsslam.matching.interface import Matcher, MatchResult, Reference
+from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
 from hsslam.scan import LaserScan
-from hsslam.se2 import Points, Pose, between, compose
+from hsslam.se2 import Points, Pose, between, compose, wrap
 from hsslam.slam.fusion import fuse, rotated
 from hsslam.slam.motion import MotionModel
 from hsslam.slam.randomness import Purpose, generator
@@ -20,6 +20,9 @@ from hsslam.slam.recovery import match_tiles
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import LocalSubmap
 from hsslam.slam.windows import foreseen_window, match_within, search_window
+
+EDGE = 0.9
+"""An answer this far from the middle of the window, as a share of its half side, may be the edge of a better one."""
 
 RECOVERY_GAIN = 0.1
 """Odometry is overruled only by an answer whose score is this much higher."""
@@ -116,6 +119,9 @@ class Tracker:
         window = foreseen_window(max(prior[0, 0], prior[1, 1]), prior[2, 2], self._window, self._widest)
         with self._stopwatch.measure("track"):
             result = match_within(self._matcher, reference, points, predicted, window, self._window, rng)
+        if _at_edge(result.pose, predicted, window):
+            with self._stopwatch.measure("recover"):
+                result = self._look_further(reference, points, predicted, result, rng)
         if not result.converged or result.score < rules.recovery_score:
             with self._stopwatch.measure("recover"):
                 result = self._recover(reference, points, result, rng)
@@ -131,6 +137,19 @@ class Tracker:
             between(newest, pose), rotated(covariance, newest[2]), result.score, matched, result.evaluations
         )
 
+    def _look_further(
+        self,
+        reference: Reference,
+        points: Points,
+        predicted: Pose,
+        first: MatchResult,
+        rng: np.random.Generator,
+    ) -> MatchResult:
+        """Search the widest window around the prediction: what a narrow one found at its edge was cut off by it."""
+        wide = match_within(self._matcher, reference, points, predicted, self._widest, self._window, rng)
+        better = wide.converged and (not first.converged or wide.score > first.score)
+        return replace(wide if better else first, evaluations=first.evaluations + wide.evaluations)
+
     def _recover(
         self, reference: Reference, points: Points, first: MatchResult, rng: np.random.Generator
     ) -> MatchResult:
@@ -144,3 +163,9 @@ class Tracker:
             evaluations += best.evaluations
         better = best.converged and (not first.converged or best.score > first.score + RECOVERY_GAIN)
         return replace(best if better else first, evaluations=evaluations)
+
+
+def _at_edge(pose: Pose, middle: Pose, window: SearchWindow) -> bool:
+    off = pose - middle
+    off[2] = wrap(off[2])
+    return bool((np.abs(off) > EDGE * window.half).any())

@@ -1,0 +1,56 @@
+"""The front end where odometry is off by more than the usual window reaches, with a good score at the window's edge."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import room_scan_at
+from numpy.typing import NDArray
+
+from hsslam.config import load_config
+from hsslam.matching.interface import SearchWindow
+from hsslam.se2 import pose
+from hsslam.slam.events import Tracked
+from hsslam.slam.pipeline import Slam
+from hsslam.slam.windows import foreseen_window
+
+LEAST = SearchWindow(0.2, 0.2, math.radians(10.0))
+MOST = SearchWindow(0.75, 0.75, math.radians(60.0))
+
+
+def tracked(truth: NDArray[np.float64], odometry: NDArray[np.float64], matcher: str) -> Tracked:
+    """The second of two scans, tracked without the help of a poor score."""
+    slam = Slam(load_config(overrides=[f"matcher={matcher}", "tracker.recovery_score=0.0"]))
+    slam.process(room_scan_at(np.zeros(3), beams=361, noise=0.005))
+    second = replace(room_scan_at(truth, beams=361, noise=0.005, seed=1), index=1, odometry=odometry)
+    event = slam.process(second)[0]
+    assert isinstance(event, Tracked)
+    return event
+
+
+@pytest.mark.parametrize("matcher", ["hide", "glasm"])
+@pytest.mark.parametrize(
+    ("truth", "odometry"),
+    [
+        (pose(0.2, 0.0, math.radians(22.0)), pose(0.2, 0.0, math.radians(36.0))),
+        (pose(0.2, 0.0, 0.0), pose(0.62, 0.0, 0.0)),
+        (pose(0.0, 0.0, math.radians(14.0)), pose(0.0, 0.0, math.radians(1.0))),
+    ],
+    ids=["turn", "jump", "late"],
+)
+def test_a_scan_beyond_the_usual_window_is_found(
+    truth: NDArray[np.float64], odometry: NDArray[np.float64], matcher: str
+) -> None:
+    found = tracked(truth, odometry, matcher)
+    assert found.relative == pytest.approx(truth, abs=0.04)
+
+
+def test_a_window_follows_the_variances_between_its_bounds() -> None:
+    assert foreseen_window(0.01**2, 0.01**2, LEAST, MOST) == LEAST
+    assert foreseen_window(9.0, 9.0, LEAST, MOST) == MOST
+    between = foreseen_window(0.1**2, 0.01**2, LEAST, MOST)
+    assert 0.3 <= between.half_x == between.half_y < 0.3 * math.sqrt(2.0)
+    assert between.half_theta == LEAST.half_theta
