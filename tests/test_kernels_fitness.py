@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from hsslam.kernels.assess import assess, degenerate_direction
 from hsslam.kernels.fitness import count_hits, interpolate_points, scratch
 from hsslam.kernels.raster import Raster
-from hsslam.kernels.refine import refine, solve3
-from hsslam.kernels.surface import Surface
+from hsslam.kernels.refine import NO_LINES, refine, solve3
+from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, GAP, Surface, lines_of
 from hsslam.se2 import transform
 from hsslam.search import HitFitness
 
@@ -140,18 +140,19 @@ def test_covariance_inverts_the_information() -> None:
     assert np.linalg.eigvalsh(covariance)[0] > 0.0
 
 
-@given(st.floats(-0.06, 0.06), st.floats(-0.06, 0.06), st.floats(-0.05, 0.05))
-@settings(deadline=None, max_examples=30)
-def test_refinement_returns_to_the_truth(x: float, y: float, theta: float) -> None:
+@given(st.floats(-0.06, 0.06), st.floats(-0.06, 0.06), st.floats(-0.05, 0.05), st.booleans())
+@settings(deadline=None, max_examples=40)
+def test_refinement_returns_to_the_truth(x: float, y: float, theta: float, both_ways: bool) -> None:
     reference = corner()
     truth = np.array([0.3, 0.2, 0.1])
     inverse_points = transform(
         np.array([*(-np.array([[0.995004, 0.099833], [-0.099833, 0.995004]]) @ truth[:2]), -0.1]), reference
     )
     s = Surface.build(reference)
+    lines = lines_of(inverse_points, GAP, FIT_SPAN, FIT_ROUGHNESS) if both_ways else NO_LINES
     start = truth + [x, y, theta]
     found, _, converged = refine(
-        s.pieces, s.nearest, s.frame, inverse_points, start, 30, 15.0, (0.15, 0.08), (0.03, 0.03)
+        s.pieces, s.nearest, s.frame, inverse_points, lines, start, 30, 15.0, (0.15, 0.08), (0.03, 0.03)
     )
     assert converged
     assert found == pytest.approx(truth, abs=2e-3)

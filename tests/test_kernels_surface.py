@@ -8,7 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hsslam.kernels.surface import GAP, REACH, Surface, nearest_segment, squared_distance
+from hsslam.kernels.surface import (
+    FIT_ROUGHNESS,
+    FIT_SPAN,
+    GAP,
+    REACH,
+    Surface,
+    lines_of,
+    nearest_segment,
+    squared_distance,
+)
 
 
 def distances(segments: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -79,6 +88,17 @@ def test_lines_average_noise_along_a_wall() -> None:
     )
     lines_tilt = np.abs(np.arctan(surface.pieces[:, 5] / surface.pieces[:, 6]))
     assert np.median(lines_tilt) < 0.4 * np.median(segments_tilt)
+
+
+def test_a_point_has_the_line_of_the_segment_that_begins_there_or_ends_where_none_begins() -> None:
+    points = np.vstack((wall(spacing=0.02, noise=0.01), [[10.0, 10.0]], wall(spacing=0.05) + [0.0, 20.0]))
+    surface = Surface.build(points)
+    lines = lines_of(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
+    for point, line in zip(points, lines, strict=True):
+        begins = np.flatnonzero((surface.segments[:, :2] == point).all(axis=1))
+        ends = np.flatnonzero((surface.segments[:, 2:] == point).all(axis=1))
+        own = (begins if len(begins) else ends)[0]
+        assert line == pytest.approx(surface.pieces[own, 5:8])
 
 
 def test_normals_are_unit_and_zero_for_a_lone_return() -> None:

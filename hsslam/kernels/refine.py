@@ -8,8 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.surface import nearest_segment, squared_distance
+from hsslam.kernels.surface import nearest_segment
 from hsslam.se2 import Points, Pose, wrap
+
+NO_LINES: NDArray[np.float64] = np.empty((0, 3))
+"""Point-to-line only."""
+
+LEAST_AGREEMENT = 0.5
+"""Cosine of the angle between two lines that may be of the same surface, at least."""
 
 
 @kernel
@@ -18,13 +24,18 @@ def refine(
     nearest: NDArray[np.uint32],
     frame: NDArray[np.float64],
     points: Points,
+    lines: NDArray[np.float64],
     start: Pose,
     iterations: int,
     settle: float,
     distances: tuple[float, float],
     scales: tuple[float, float],
 ) -> tuple[Pose, int, bool]:
-    """Minimise the Cauchy-weighted distances of points from the lines of their nearest segments.
+    """Minimise the Cauchy-weighted distances of points from the lines of their nearest segments, and back.
+
+    Where the scan's own lines are given, the place on the segment nearest to a point is also to lie on the line
+    through the scan at that point: the noise of either scan then counts in one of the two distances only, and the
+    lines of neither are taken for the truth.
 
     Parameters
     ----------
@@ -32,6 +43,9 @@ def refine(
         Of a `Surface`.
     points : Points
         (N, 2) m.
+    lines : float64 (N, 3)
+        Unit normals and offsets of the scan's lines at its points, zero where it has none: see `lines_of`. (0, 3):
+        point-to-line only.
     start : Pose
         Where to begin.
     iterations : int
@@ -52,6 +66,7 @@ def refine(
     hessian = np.empty((3, 3))
     right = np.empty(3)
     step = np.empty(3)
+    both = lines.shape[0] > 0
     for iteration in range(iterations):
         left = 1.0 - iteration / settle
         distance = max(distances[1], distances[0] * left)
@@ -66,7 +81,12 @@ def refine(
             ry = s * points[i, 0] + c * points[i, 1]
             x, y = x0 + rx, y0 + ry
             k = nearest_segment(nearest, frame, x, y)
-            if k < 0 or squared_distance(pieces, k, x, y) > distance * distance:
+            if k < 0:
+                continue
+            px, py = x - pieces[k, 0], y - pieces[k, 1]
+            along = min(max(px * pieces[k, 2] + py * pieces[k, 3], 0.0), pieces[k, 4])
+            ex, ey = px - along * pieces[k, 2], py - along * pieces[k, 3]
+            if ex * ex + ey * ey > distance * distance:
                 continue
             nx, ny = pieces[k, 5], pieces[k, 6]
             residual = nx * x + ny * y - pieces[k, 7]
@@ -78,6 +98,26 @@ def refine(
             xy += wx * ny
             xt += wx * nt
             yy += wy * ny
+            yt += wy * nt
+            tt += wt * nt
+            gx += wx * residual
+            gy += wy * residual
+            gt += wt * residual
+            if not (settled and both):
+                continue
+            mx, my = c * lines[i, 0] - s * lines[i, 1], s * lines[i, 0] + c * lines[i, 1]
+            agreement = nx * mx + ny * my
+            if abs(agreement) < LEAST_AGREEMENT:
+                continue
+            sx, sy = x - ex - x0, y - ey - y0
+            residual = lines[i, 2] - mx * sx - my * sy
+            weight = squared_scale / (squared_scale + residual * residual)
+            nt = my * sx - mx * sy
+            wx, wy, wt = weight * mx, weight * my, weight * nt
+            xx += wx * mx
+            xy += wx * my
+            xt += wx * nt
+            yy += wy * my
             yt += wy * nt
             tt += wt * nt
             gx += wx * residual

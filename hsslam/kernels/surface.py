@@ -163,6 +163,29 @@ def join(
 
 
 @kernel
+def lines_of(points: Points, gap: float, span: float, roughness: float) -> NDArray[np.float64]:
+    """Line through each point and its neighbours: unit normal and offset, (N, 3); zero where there are none."""
+    n = points.shape[0]
+    lines = np.empty((n, 3))
+    line = np.zeros(5)
+    joined_before = False
+    for i in range(n):
+        joined = False
+        if i + 1 < n:
+            dx = points[i + 1, 0] - points[i, 0]
+            dy = points[i + 1, 1] - points[i, 1]
+            joined = dx * dx + dy * dy <= gap * gap
+        if joined:
+            fit_line(points, i, gap, span, roughness, line)
+        elif not joined_before:
+            line[:] = 0.0
+        lines[i, 0], lines[i, 1] = line[2], line[3]
+        lines[i, 2] = line[2] * line[0] + line[3] * line[1]
+        joined_before = joined
+    return lines
+
+
+@kernel
 def fit_line(
     points: Points, i: int, gap: float, span: float, roughness: float, out: NDArray[np.float64]
 ) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hsslam.kernels.refine import refine
+from hsslam.kernels.refine import NO_LINES, refine
 from hsslam.kernels.surface import rasterise_nearest
 from hsslam.matching.interface import Reference
 from hsslam.se2 import Points, Pose
@@ -71,6 +71,7 @@ def point_to_line_icp(
         reference.far,
         reference.far_frame,
         points,
+        NO_LINES,
         guess,
         iterations,
         0.5 * (iterations - 1),
@@ -82,6 +83,7 @@ def point_to_line_icp(
         surface.nearest,
         surface.frame,
         points,
+        NO_LINES,
         coarse,
         iterations,
         0.5 * (iterations - 1),

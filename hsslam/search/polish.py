@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from hsslam.kernels.refine import refine
+from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, GAP, lines_of
 from hsslam.matching.interface import Reference, SearchWindow
 from hsslam.se2 import Points, Pose
 
@@ -12,7 +13,7 @@ SETTLE = 4.0
 REACHES = (0.15, 0.08)
 """The refinement uses points this near to the surface (m), from the first iteration to the last."""
 
-SCALES = (0.10, 0.025)
+SCALES = (0.10, 0.02)
 """Scale of the refinement's robust weight (m), from the first iteration to the last."""
 
 
@@ -25,7 +26,7 @@ Where a truth lies near the edge, noise alone carries the refined pose across it
 def polish(
     reference: Reference, points: Points, start: Pose, guess: Pose, window: SearchWindow, iterations: int
 ) -> tuple[Pose, int]:
-    """Refine a pose by point-to-line Gauss-Newton, as population matchers do: the pose, iterations spent.
+    """Refine a pose by Gauss-Newton, points to lines and lines to points: the pose, iterations spent.
 
     A refinement that leads away from the window is discarded: then the pose is ``start``.
     """
@@ -35,6 +36,7 @@ def polish(
         surface.nearest,
         surface.frame,
         points,
+        lines_of(points, GAP, FIT_SPAN, FIT_ROUGHNESS),
         start,
         iterations,
         SETTLE,

@@ -35,14 +35,16 @@ class PopulationConfig(MatcherConfig):
     resolution: float = Field(
         default=0.025, gt=0.0, le=0.5, description="side of a raster cell of the fitness (m)"
     )
-    refine: bool = Field(default=True, description="polish the best pose by point-to-line Gauss-Newton")
+    refine: bool = Field(
+        default=True, description="polish the best pose by Gauss-Newton on the lines of both scans"
+    )
     search_points: int = Field(
         default=96,
         ge=10,
         description="points of the scan that the search looks at, spread over it, in a window of the paper's size "
         "and where a refinement follows, which uses all",
     )
-    refine_iterations: int = Field(default=12, ge=1, description="iterations of the refinement, at most")
+    refine_iterations: int = Field(default=40, ge=1, description="iterations of the refinement, at most")
 
 
 class PopulationReference(Reference):

@@ -25,7 +25,9 @@ class GlasmConfig(PopulationConfig):
         le=1.0,
         description="half side of the squares of the fitness (m): 10.5 cm squares",
     )
-    refine: bool = Field(default=False, description="polish the best pose by point-to-line Gauss-Newton")
+    refine: bool = Field(
+        default=False, description="polish the best pose by Gauss-Newton on the lines of both scans"
+    )
     population_size: int = Field(default=120, ge=2, description="chromosomes in a generation")
     generations: int = Field(default=12, ge=1, description="generations evaluated")
     bits: int = Field(default=9, ge=2, le=20, description="bits of the Gray code of each variable")
