@@ -109,8 +109,14 @@ class TrackerSection(Section):
 class KeyframeSection(Section):
     """When a scan becomes a keyframe, and how many make a submap."""
 
-    distance: float = Field(default=0.3, gt=0.0, description="a keyframe after this much travel (m)")
+    distance: float = Field(default=0.5, gt=0.0, description="a keyframe after this much travel (m)")
     angle_deg: float = Field(default=10.0, gt=0.0, description="or after this much turning (deg)")
+    min_score: float = Field(
+        default=0.8,
+        ge=0.0,
+        le=1.0,
+        description="or after a third of these, where the submap explains less than this share of the scan",
+    )
     submap_size: int = Field(
         default=30, ge=1, description="keyframes in a full local submap; half as many in a young one"
     )
@@ -189,7 +195,7 @@ class GraphSection(Section):
     )
     overlap_half_theta_deg: float = Field(default=5.0, gt=0.0, description="half its extent in heading (deg)")
     rescan_keyframes: int = Field(
-        default=18,
+        default=10,
         ge=0,
         description="keyframes every scan is matched against once more at the very end (0: not at all)",
     )

@@ -63,11 +63,11 @@ def test_presets_lie_under_the_file_and_over_the_base(tmp_path: Path) -> None:
 
 def test_a_later_preset_wins_and_an_option_stands_in_for_the_files(tmp_path: Path) -> None:
     path = tmp_path / "c.yaml"
-    path.write_text("preset: [rplidar-a2, warehouse]\n")
-    assert load_config(path).keyframes.distance == 0.5
-    path.write_text("preset: [warehouse, rplidar-a2]\n")
-    assert load_config(path).keyframes.distance == 0.2
+    path.write_text("preset: [corridor, rplidar-a2, warehouse]\n")
     assert load_config(path).loops.radius == 6.0
+    assert load_config(path).keyframes.distance == 0.2
+    path.write_text("preset: [warehouse, corridor]\n")
+    assert load_config(path).tracker.window.half_x == 0.05
     assert load_config(path, presets=["office"]) == Config()
 
 
@@ -154,4 +154,4 @@ def test_a_resumed_run_is_not_given_another_preset(tmp_path: Path) -> None:
     assert load_config(tmp_path / "r" / "config.yaml").tracker.window.half_x == 0.05
     assert hsslam("run", "--resume", tmp_path / "r", "--quiet").exit_code == 0
     other = hsslam("run", "--resume", tmp_path / "r", "--preset", "warehouse")
-    assert other.exit_code == 2 and "config.keyframes.distance was 0.3, now 0.5" in other.stderr
+    assert other.exit_code == 2 and "config.loops.radius was 3.0, now 6.0" in other.stderr

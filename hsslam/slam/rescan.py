@@ -20,7 +20,7 @@ from hsslam.slam.graph import FLOOR_STD_THETA, FLOOR_STD_XY
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.submap import merge
 
-BLOCK = 6
+BLOCK = 4
 """Keyframes in a row whose scans are matched against the same submap."""
 
 

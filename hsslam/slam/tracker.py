@@ -16,13 +16,15 @@ from hsslam.se2 import Points, Pose, between, compose, wrap
 from hsslam.slam.fusion import fuse, rotated
 from hsslam.slam.motion import MotionModel
 from hsslam.slam.randomness import Purpose, generator
-from hsslam.slam.recovery import match_tiles
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import LocalSubmap
 from hsslam.slam.windows import foreseen_window, match_within, search_window
 
 EDGE = 0.9
 """An answer this far from the middle of the window, as a share of its half side, may be the edge of a better one."""
+
+SOONER = 1.0 / 3.0
+"""Share of the usual way to the next keyframe after which one is made where the submap explains too little."""
 
 RECOVERY_GAIN = 0.1
 """Odometry is overruled only by an answer whose score is this much higher."""
@@ -96,10 +98,12 @@ class Tracker:
         return tracked
 
     def wants_keyframe(self, tracked: TrackedScan) -> bool:
-        """Whether the scan is far enough from the newest keyframe to become one."""
+        """Whether the scan is far enough from the newest keyframe to become one, or sees what the submap lacks."""
         x, y, theta = tracked.relative
         rules = self._config.keyframes
-        return math.hypot(x, y) >= rules.distance or abs(theta) >= math.radians(rules.angle_deg)
+        share = 1.0 if tracked.score >= rules.min_score else SOONER
+        far = math.hypot(x, y) >= share * rules.distance
+        return far or abs(theta) >= share * math.radians(rules.angle_deg)
 
     def add_keyframe(self, points: Points, tracked: TrackedScan) -> None:
         """Make the last scan the newest keyframe."""
@@ -159,7 +163,7 @@ class Tracker:
         best = self._matcher.match(reference, points, repeated, self._window, rng)
         evaluations = first.evaluations + best.evaluations
         if not best.converged or best.score < rules.recovery_score:
-            best = match_tiles(self._matcher, reference, points, repeated, self._widest, self._window, rng)
+            best = match_within(self._matcher, reference, points, repeated, self._widest, self._window, rng)
             evaluations += best.evaluations
         better = best.converged and (not first.converged or best.score > first.score + RECOVERY_GAIN)
         return replace(best if better else first, evaluations=evaluations)
