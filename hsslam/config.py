@@ -18,6 +18,7 @@ from hsslam import presets as preset_files
 from hsslam.errors import ConfigError
 from hsslam.matching import registry
 from hsslam.matching.interface import Matcher, MatcherConfig
+from hsslam.settings_file import blamed, read_yaml
 from hsslam.validation import explain
 
 
@@ -244,7 +245,7 @@ def expand(data: dict[str, Any]) -> dict[str, Any]:
     named = data.get("preset") or ()
     names = [named] if isinstance(named, str) else named
     if not (isinstance(names, list | tuple) and all(isinstance(name, str) for name in names)):
-        raise ConfigError(f"preset: expected a name or a list of names, found {named!r}")
+        raise ConfigError(f"preset: expected a name or a list of names, found {named!r}", ("preset",), named)
     under: dict[str, Any] = {}
     for name in names:
         under = merge(under, preset_files.settings(name))
@@ -282,7 +283,11 @@ def load_config(
     told = read_yaml(path) if path is not None else {}
     if presets:
         told["preset"] = list(presets)
-    data = merge(deepcopy(dict(base or {})), expand(told))
+    try:
+        under = expand(told)
+    except ConfigError as error:
+        raise error if path is None or presets else blamed(error, path) from error
+    data = merge(deepcopy(dict(base or {})), under)
     data = merge(data, deepcopy(dict(chosen or {})))
     for override in overrides:
         apply_override(data, override)
@@ -293,35 +298,17 @@ _Model = TypeVar("_Model", bound=BaseModel)
 
 
 def validate(model: type[_Model], data: Mapping[str, Any], source: str = "") -> _Model:
-    """Validate plain data against a model; see `load_config` for what is raised."""
+    """Validate plain data against a model; ``source`` is the file it was made from.
+
+    See `load_config` for what is raised.
+    """
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        where = f"{source}: " if source else ""
-        raise ConfigError(where + explain(error, model)) from error
-
-
-def read_yaml(path: Path | str) -> dict[str, Any]:
-    """Read a YAML mapping with the safe loader.
-
-    Raises
-    ------
-    ConfigError
-        The file is not there, is no YAML, or holds something else than a mapping.
-    """
-    try:
-        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f":{mark.line + 1}" if mark is not None else ""
-        raise ConfigError(f"{path}{line}: not YAML: {getattr(error, 'problem', error)}") from error
-    if data is None:
-        return {}
-    if not isinstance(data, dict):
-        raise ConfigError(f"{path}: expected settings (key: value), found {type(data).__name__}")
-    return data
+        problem = explain(error, model)
+        raise blamed(problem, source) if source else problem from error
+    except ConfigError as error:
+        raise blamed(error, source) if source else error from error
 
 
 def apply_override(data: dict[str, Any], override: str) -> None:

@@ -20,9 +20,24 @@ class DataError(HsslamError):
 
 
 class ConfigError(HsslamError):
-    """A setting is unknown or out of its range."""
+    """A setting is unknown or out of its range.
+
+    Parameters
+    ----------
+    message : str
+        What its reader is told.
+    key : tuple of str or int, optional
+        Which setting it is about, outermost section first; empty where it is about all of them together.
+    found : object
+        Its value.
+    """
 
     exit_code = 2
+
+    def __init__(self, message: str, key: tuple[str | int, ...] | None = None, found: object = None) -> None:
+        self.key = key
+        self.found = found
+        super().__init__(message)
 
 
 class UnavailableError(HsslamError):

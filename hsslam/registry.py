@@ -110,7 +110,7 @@ class Registry(Generic[T]):
             return self._loaded[here]
         declared = self._entry_points().get(name)
         if declared is None:
-            raise ConfigError(f"no {self.kind} is named {name!r}{self.suggest(name)}")
+            raise ConfigError(f"no {self.kind} is named {name!r}{self.suggest(name)}", ("name",), name)
         if name in self._condemned:
             raise UnavailableError(name, self._condemned[name], self.remedy(name), self.kind)
         try:

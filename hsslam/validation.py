@@ -7,9 +7,11 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from hsslam.errors import ConfigError
 
-def explain(error: ValidationError, model: type[BaseModel], prefix: str = "") -> str:
-    """One line per problem: where, what was expected, what was found; unknown keys come with a suggestion.
+
+def explain(error: ValidationError, model: type[BaseModel], prefix: str = "") -> ConfigError:
+    """Say what is wrong: where, what was expected, what was found; unknown keys come with a suggestion.
 
     Parameters
     ----------
@@ -19,6 +21,11 @@ def explain(error: ValidationError, model: type[BaseModel], prefix: str = "") ->
         Its fields are what suggestions are made from.
     prefix : str
         Dotted path of the model within the whole config.
+
+    Returns
+    -------
+    ConfigError
+        It knows which setting the first problem is about.
     """
     lines = []
     for item in error.errors():
@@ -32,7 +39,10 @@ def explain(error: ValidationError, model: type[BaseModel], prefix: str = "") ->
             found = item.get("input")
             shown = "" if isinstance(found, dict | BaseModel) else f", found {found!r}"
             lines.append(f"{where}: {message[:1].lower()}{message[1:]}{shown}")
-    return "; ".join(lines)
+    first = error.errors()[0]
+    missing = first["type"] == "missing"
+    key = (*((prefix,) if prefix else ()), *(first["loc"][:-1] if missing else first["loc"]))
+    return ConfigError("; ".join(lines), key, first.get("input"))
 
 
 def unknown_key(where: str, key: str, known: list[str]) -> str:

@@ -111,17 +111,17 @@ def test_a_broken_plugin_is_listed_as_such_and_takes_nothing_down(
 
 
 @pytest.mark.parametrize(
-    ("module", "reason"),
+    ("module", "patience", "reason"),
     [
-        ("import ctypes\nctypes.string_at(0)\n", r"its import crashes \(signal 11\)"),
-        ("import time\ntime.sleep(3600)\n", "its import does not come back within 3 s"),
+        ("import ctypes\nctypes.string_at(0)\n", 60.0, r"its import crashes \(signal 11\)"),
+        ("import time\ntime.sleep(3600)\n", 2.0, "its import does not come back within 2 s"),
     ],
 )
 def test_a_plugin_whose_import_crashes_or_hangs_is_kept_out(
-    site: Path, monkeypatch: pytest.MonkeyPatch, module: str, reason: str
+    site: Path, monkeypatch: pytest.MonkeyPatch, module: str, patience: float, reason: str
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(site), os.environ.get("PYTHONPATH", "")]))
-    monkeypatch.setattr("hsslam.matching.registry.tried", partial(tried, patience=3.0))
+    monkeypatch.setattr("hsslam.matching.registry.tried", partial(tried, patience=patience))
     monkeypatch.setattr(registry._matchers, "_condemned", {})
     install(site, "deadly-package", {"deadly": "deadly_module:Deadly"}, {"deadly_module": module})
     registry.quarantine(["deadly", "hide", "no such name"])

@@ -91,10 +91,10 @@ def do(order: Mapping[str, Any]) -> dict[str, Any]:
         folder = Path(scratch) / str(order["folder"])
         folder.mkdir()
         try:
-            job = validate(Job, json.loads(order["job"]), source="job")
+            job = validate(Job, json.loads(order["job"]))
             kind, seed = job.kind, job.seed
             _check_terms(order["terms"], terms_of(job))
-            limits = validate(LimitSection, json.loads(order["limits"]), source="limits")
+            limits = validate(LimitSection, json.loads(order["limits"]))
             done = run_job(job, folder, limits)
         except HsslamError as error:
             done = Failure(kind, str(error), "", seed)

@@ -18,9 +18,9 @@ from typing import Any
 import yaml
 
 from hsslam import plugin_files
-from hsslam.config import read_yaml
 from hsslam.errors import ConfigError, DataError
 from hsslam.io.atomic import atomic_path
+from hsslam.settings_file import read_yaml
 from hsslam.version import __version__
 from hsslam_eval.compare_config import CompareConfig, DatasetSpec
 from hsslam_eval.jobs import Job

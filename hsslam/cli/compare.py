@@ -216,8 +216,9 @@ def resolve(
     ConfigError
         As `hsslam.config.load_config` does.
     """
-    from hsslam.config import apply_override, merge, read_yaml, validate
+    from hsslam.config import apply_override, merge, validate
     from hsslam.matching import registry
+    from hsslam.settings_file import read_yaml
     from hsslam_eval.compare_config import DEFAULT_MATCHERS, CompareConfig
 
     data = merge(read_yaml(file) if file is not None else {}, given)

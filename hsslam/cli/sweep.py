@@ -88,18 +88,16 @@ def sweep(
 
 def read(file: Path) -> SweepConfig:
     """Read a sweep's file; raises `ConfigError`."""
-    from hsslam.config import read_yaml, validate
+    from hsslam.config import validate
     from hsslam.matching import registry
+    from hsslam.settings_file import read_yaml
     from hsslam_eval.sweep_config import SweepConfig
 
     data = read_yaml(file)
     listed = data.get("matchers")
     items = listed if isinstance(listed, list) else []
     registry.quarantine(str(item.get("name") if isinstance(item, dict) else item) for item in items)
-    try:
-        return validate(SweepConfig, data)
-    except ConfigError as error:
-        raise ConfigError(f"{file}: {error}") from error
+    return validate(SweepConfig, data, source=str(file))
 
 
 class Tell:

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from hsslam.errors import ConfigError, HsslamError, MatcherUnavailableError, UnavailableError
+from hsslam.errors import HsslamError, MatcherUnavailableError, UnavailableError
 from hsslam.matching.interface import Matcher, MatcherConfig
 from hsslam.probe import CRASHES, tried
 from hsslam.registry import Registry
@@ -131,7 +131,7 @@ def configure(name: str, parameters: Mapping[str, Any] | None = None, label: str
     try:
         return model.model_validate(dict(parameters or {}))
     except ValidationError as error:
-        raise ConfigError(explain(error, model, prefix=label or name)) from error
+        raise explain(error, model, prefix=label or name) from error
     except Exception as error:  # a plugin's own validators may fail in any way
         reason = f"its Config cannot be made: {type(error).__name__}: {error}"
         raise MatcherUnavailableError(name, reason, _matchers.remedy(name)) from error

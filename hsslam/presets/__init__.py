@@ -52,7 +52,9 @@ def load(name: str) -> Preset:
             return Preset(name, kind, text.splitlines()[0].lstrip("# "), text)
     close = difflib.get_close_matches(name, names(), n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ""
-    raise ConfigError(f"no preset is named {name!r}{hint} (there are: {', '.join(names())})")
+    raise ConfigError(
+        f"no preset is named {name!r}{hint} (there are: {', '.join(names())})", ("preset",), name
+    )
 
 
 def settings(name: str) -> dict[str, Any]:

@@ -140,7 +140,7 @@ def minimize(
     try:
         configured = chosen.options.model_validate(options)
     except ValidationError as error:
-        raise ConfigError(explain(error, chosen.options, prefix=method)) from error
+        raise explain(error, chosen.options, prefix=method) from error
     if seed is not None and rng is not None:
         raise ConfigError("give seed or rng, not both")
     _at_least("maxfev", maxfev, 1)
