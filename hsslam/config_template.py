@@ -86,8 +86,17 @@ def _comment(text: str) -> str:
 
 
 def _reasons(text: str) -> str:
-    """The comments of a preset's file, without the settings between them."""
-    return "\n".join(line.lstrip("# ") for line in text.splitlines() if line.startswith("#"))
+    """The comments of a preset's file, without the settings between them: its first line, then a paragraph each."""
+    summary, *lines = text.splitlines()
+    paragraphs = [summary.lstrip("# ")]
+    comment = False
+    for line in lines:
+        if comment and line.startswith("#"):
+            paragraphs[-1] += f" {line.lstrip('# ')}"
+        elif line.startswith("#"):
+            paragraphs.append(line.lstrip("# "))
+        comment = line.startswith("#")
+    return "\n".join(paragraphs)
 
 
 def _first_line(model: type[BaseModel]) -> str:

@@ -60,6 +60,7 @@ def examine(data_dir: Path | None = None) -> Iterator[Finding]:
     yield from _matchers()
     yield _plugin_files()
     yield _bags()
+    yield _sweeps()
     yield from _data(data_dir)
     yield _output()
     yield Finding("display", "ok", "not needed: pictures and reports are drawn without one")
@@ -73,6 +74,14 @@ def _bags() -> Finding:
         return Finding("ROS bags", "ok", f"read by rosbags {metadata.version('rosbags')}")
     except metadata.PackageNotFoundError:
         return Finding("ROS bags", "missing", "rosbags is not installed", INSTALL)
+
+
+def _sweeps() -> Finding:
+    """Whether sweeps run; even on one machine they are scheduled by Dask."""
+    try:
+        return Finding("sweeps", "ok", f"run by distributed {metadata.version('distributed')}")
+    except metadata.PackageNotFoundError:
+        return Finding("sweeps", "missing", "distributed is not installed", "pip install 'hsslam[sweep]'")
 
 
 def _python() -> Finding:

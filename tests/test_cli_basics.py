@@ -74,7 +74,7 @@ def test_version() -> None:
         (["run", "office", "--resume", "a", "--out", "b"], 2, "leave out --out"),
         (["run", "--resume", "nowhere"], 3, "no run to resume"),
         (["run", "office", "--on-error", "panic"], 2, "--on-error is stop or skip"),
-        (["match", "office", "1"], 3, "office"),
+        (["match", "office", "1"], 2, "two scans' numbers"),
         (["match", "office", "1", "two"], 2, "two scans' numbers"),
         (["match", "office", "1", "2", "--guess", "1,2"], 2, "--guess: expected x,y,degrees"),
         (["match", "office", "1", "2", "--window", "0,1,2"], 2, "three positive numbers"),

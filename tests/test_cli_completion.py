@@ -32,6 +32,7 @@ def completed(line: str, after: str = "") -> list[str]:
         ("hsslam run --loop", ["--loop-matcher"]),
         ("hsslam run --matcher hi", ["hide"]),
         ("hsslam run --loop-matcher gl", ["glasm"]),
+        ("hsslam run --preset urg", ["urg-04lx"]),
         ("hsslam compare off", ["office"]),
         ("hsslam compare office --matchers kiss", ["kiss_icp"]),
         ("hsslam matchers describe hs", ["hsl"]),

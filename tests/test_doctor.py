@@ -89,3 +89,8 @@ def test_without_a_place_for_a_cache_kernels_still_compile() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "42", done.stderr
+
+
+def test_it_knows_every_extra_that_a_verb_needs() -> None:
+    parts = {finding.what for finding in examine()}
+    assert {"ROS bags", "sweeps"} <= parts

@@ -53,9 +53,8 @@ def test_a_table_gives_back_what_was_written(
     tmp_path: Path, rows: list[tuple[float, ...]], data: st.DataObject, name: str, read: Reader, write: Writer
 ) -> None:
     beams = data.draw(st.integers(1, 5))
-    geometry = ScanGeometry(
-        data.draw(number), data.draw(number), 0.1, data.draw(st.sampled_from([4.0, math.inf]))
-    )
+    step = data.draw(st.floats(-1.5, 1.5))  # more would be more than a turn
+    geometry = ScanGeometry(data.draw(number), step, 0.1, data.draw(st.sampled_from([4.0, math.inf])))
     laser = np.array([data.draw(number), data.draw(number), data.draw(st.floats(-math.pi, 3.14))])
     scans = [
         LaserScan(

@@ -155,3 +155,8 @@ def test_a_resumed_run_is_not_given_another_preset(tmp_path: Path) -> None:
     assert hsslam("run", "--resume", tmp_path / "r", "--quiet").exit_code == 0
     other = hsslam("run", "--resume", tmp_path / "r", "--preset", "warehouse")
     assert other.exit_code == 2 and "config.loops.radius was 3.0, now 6.0" in other.stderr
+
+
+def test_a_presets_reasons_are_wrapped_as_paragraphs() -> None:
+    text = commented(load_config(presets=["rplidar-a2"]), ["rplidar-a2"])
+    assert "5.7 cm in the\n# office, from 6.2 to 5.9 cm in the hall (eval" in text

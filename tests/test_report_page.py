@@ -185,7 +185,7 @@ def test_failures_are_shown_and_escaped(folder: Path) -> None:
         assert "it <broke> & fell" in page
         assert "unavailable: no module" in page
         assert "pip install it" in page
-        assert "raising 60 times" in page
+        assert "raising 60 of 60" in page
         assert "Recorded by somebody, CC-BY 3.0" in page
         assert "hsslam compare office" in page
 

@@ -8,6 +8,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Protocol
 
+from hsslam.datasets.file import FileDataset
+from hsslam.datasets.usable import require_returns
 from hsslam.environment import environment
 from hsslam_eval.compare_config import CompareConfig, Contestant, DatasetSpec
 from hsslam_eval.comparison import (
@@ -92,9 +94,14 @@ def compare_datasets(
     ConfigError
         A matcher or a setting is unknown, or ``out`` holds another comparison.
     DataError
-        A dataset cannot be opened, or ``out`` holds something else.
+        A dataset cannot be opened or holds nothing to match, or ``out`` holds something else.
     """
-    infos = [dataset.open().info for dataset in datasets]
+    infos = []
+    for dataset in datasets:
+        log = dataset.open()
+        if isinstance(log, FileDataset):  # a plugin's is read by the jobs only: it may crash
+            require_returns(log)
+        infos.append(log.info)
     workspace = Workspace.prepare(Path(out), config, datasets)
     tell = progress if progress is not None else _silent
     now = datetime.now().astimezone().isoformat(timespec="seconds")

@@ -19,7 +19,9 @@ from hsslam_eval.panels import DPI, legend_below, panel
 from hsslam_eval.style import Style
 
 _UNKNOWN = 0.2
-_ACCEPTED, _REJECTED = "#00875a", "#c2410c"
+# Neither is a matcher's colour, and they differ in print without colours too.
+_ACCEPTED: dict[str, Any] = {"color": "#000000", "linestyle": "-"}
+_REJECTED: dict[str, Any] = {"color": "#e0007a", "linestyle": (0, (2, 1.5))}
 Limits = tuple[float, float, float, float]
 
 
@@ -33,17 +35,17 @@ def trajectory(label: str, slam: SlamOutcome, look: Style, limits: Limits) -> Fi
     axes.plot(path[:, 0], path[:, 1], color=look.colour, linewidth=1.1, label=label)
     # Thousands of loops would hide the rest: the more there are, the thinner.
     width = float(np.clip(12.0 / math.sqrt(max(len(slam.loops), 1)), 0.2, 0.8))
-    for accepted, colour in ((False, _REJECTED), (True, _ACCEPTED)):
+    for accepted, look_of_loops in ((False, _REJECTED), (True, _ACCEPTED)):
         loops = [(loop.first, loop.second) for loop in slam.loops if loop.accepted is accepted]
         if loops:
-            axes.add_collection(LineCollection(loops, colors=colour, linewidths=width, zorder=1.5))
+            axes.add_collection(LineCollection(loops, linewidths=width, zorder=1.5, **look_of_loops))
     if len(path):
         axes.plot(*path[0], marker="o", color="black", markersize=5, linestyle="none", label="start")
     _metres(axes, limits)
-    for accepted, colour, name in ((True, _ACCEPTED, "accepted"), (False, _REJECTED, "rejected")):
+    for accepted, look_of_loops, name in ((True, _ACCEPTED, "accepted"), (False, _REJECTED, "rejected")):
         count = sum(loop.accepted is accepted for loop in slam.loops)
         if slam.loops:
-            axes.add_line(Line2D([], [], color=colour, linewidth=1.2, label=f"loop {name} ({count})"))
+            axes.add_line(Line2D([], [], linewidth=1.2, label=f"loop {name} ({count})", **look_of_loops))
     legend_below(figure, axes, 2)
     return figure
 

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -32,8 +33,9 @@ def panel(width: float, height: float) -> tuple[Figure, Axes]:
 
 
 def legend_below(figure: Figure, axes: Axes, columns: int = 3) -> None:
-    """Put the legend under the panel, in so many columns."""
-    handles, labels = axes.get_legend_handles_labels()
+    """Put the legend under the panel, in so many columns; a marker's shape is seen without its error bars."""
+    drawn, labels = axes.get_legend_handles_labels()
+    handles = [handle[0] if isinstance(handle, ErrorbarContainer) else handle for handle in drawn]
     figure.legend(
         handles,
         labels,

@@ -190,7 +190,7 @@ def _templates() -> Environment:
     )
     # A heading may break between its words, not within its unit.
     templates.filters["tight"] = lambda text: re.sub(
-        r"\([^)]*\)", lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), text
+        r"\([^)]*\)|Δ \w", lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), text
     )
     templates.filters["cell"] = lambda text: str(text).replace("|", r"\|").replace("\n", " ")
     return templates

@@ -143,7 +143,7 @@ def place_text(comparison: Comparison) -> str:
     several = any(len(matcher.runs) > 1 for matcher in comparison.matchers)
     which = " Drawn is each matcher's first run." if several else ""
     return (
-        f"Left, the trajectory {drawn}; green: loops accepted, red: loops tried and rejected. Right, the map in the "
+        f"Left, the trajectory {drawn}; black: loops accepted, dashed: loops tried and rejected. Right, the map in the "
         f"run's own frame: black is occupied, white free, grey unknown. All at one scale.{which}"
     )
 

@@ -60,8 +60,9 @@ def slam_tables(comparison: Comparison) -> list[Table]:
                 if comparison.notes
                 else "Runs one after the other, each in a process of its own, compilation excluded. "
             )
-            + "Wall time is from the first scan read to the last pose; the real-time factor is seconds driven per "
-            "second computed. Peak memory is the process's, interpreter and libraries included."
+            + "Wall time is from the first scan read to the last pose; where it is longer than processor time, the run "
+            "waited for something else on the machine. The real-time factor is seconds driven per second of wall "
+            "time. Peak memory is the process's, interpreter and libraries included."
             + (" Means over the seeds, ± standard deviation." if seeds > 1 else ""),
             ["runs", *(heading for heading, _ in _COST)],
             [
@@ -115,6 +116,7 @@ def _loops(runs: Runs) -> Cell:
 
 _COST: list[tuple[str, Callable[[Runs], Cell]]] = [
     ("wall time (s)", lambda runs: over_seeds([run.wall_seconds for run in runs])),
+    ("processor time (s)", lambda runs: over_seeds([run.cpu_seconds for run in runs])),
     ("real-time factor", lambda runs: over_seeds([run.real_time_factor for run in runs])),
     ("peak memory (MB)", lambda runs: over_seeds([run.peak_memory_mb for run in runs], 0)),
     ("keyframes", lambda runs: _count("keyframes", runs)),

@@ -129,7 +129,7 @@ def _count(value: int) -> Cell:
 def _unanswered(comparison: Comparison) -> str:
     """Say why there were trials without an answer, the most frequent reasons first."""
     reasons = [
-        f"{matcher.label} {count} times ({reason[:160]})"
+        f"{matcher.label} {count} of {matcher.trials.count} ({reason[:160]})"
         for matcher in comparison.matchers
         if matcher.trials is not None
         for reason, count in list(matcher.trials.unanswered.items())[:3]

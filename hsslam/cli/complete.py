@@ -10,6 +10,13 @@ def matchers(incomplete: str) -> list[str]:
     return _begin_like(incomplete, {entry.name for entry in entry_points(group="hsslam.matchers")})
 
 
+def presets(incomplete: str) -> list[str]:
+    """Names of presets that begin like this."""
+    from hsslam import presets
+
+    return _begin_like(incomplete, set(presets.names()))
+
+
 def datasets(incomplete: str) -> list[str]:
     """Names of datasets that begin like this; the shell itself offers files where there is none."""
     from hsslam.datasets import catalogue

@@ -12,7 +12,7 @@ from hsslam.cli.options import AsJson, ConfigFile, MatcherName, Presets, Seed, S
 from hsslam.cli.settings import resolve
 
 app: typer.Typer = typer.Typer(
-    help="Show, check and explain settings.", rich_markup_mode=None, no_args_is_help=True
+    help="Show and check settings, list presets.", rich_markup_mode=None, no_args_is_help=True
 )
 
 

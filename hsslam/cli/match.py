@@ -133,7 +133,7 @@ def _points(what: list[str], seed: int, data_dir: Path | None) -> tuple[Points, 
     from hsslam.io.points import read_points
     from hsslam.se2 import between
 
-    if len(what) == 2:
+    if len(what) == 2 and not what[1].isdigit():
         return read_points(what[0]), read_points(what[1]), np.zeros(3)
     if len(what) != 3 or not all(part.isdigit() for part in what[1:]):
         raise ConfigError(

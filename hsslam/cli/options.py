@@ -68,6 +68,7 @@ Presets: TypeAlias = Annotated[
         "--preset",
         metavar="NAME",
         help="Defaults for a sensor or a place, e.g. rplidar-a2 or corridor; may be repeated.",
+        autocompletion=complete.presets,
     ),
 ]
 

@@ -63,6 +63,7 @@ class Lines(Progress):
         self._told_of_compiling = False
         self._what, self._unit = "", ""
         self._total: float | None = None
+        self._compiling_since: float | None = None
         self._started = self._printed = time.monotonic()
 
     def _stage(self, what: str, total: float | None, unit: str) -> None:
@@ -78,7 +79,7 @@ class Lines(Progress):
         if now - self._printed < self._every:
             return
         self._printed = now
-        rate = done / (now - self._started)
+        rate = done / max(now - self._started, 1e-3)
         line = f"{self._what}: {done:,.0f}"
         if self._total is not None:
             line += f" of {self._total:,.0f}"
@@ -88,7 +89,12 @@ class Lines(Progress):
         self._print(line + (f", {note}" if note else ""))
 
     def compiling(self, begins: bool) -> None:
-        """Print that, once."""
+        """Print that, once; what it takes is left out of the rate, and of the time left."""
+        if begins and self._compiling_since is None:
+            self._compiling_since = time.monotonic()
+        elif not begins and self._compiling_since is not None:
+            self._started += time.monotonic() - self._compiling_since
+            self._compiling_since = None
         if begins and not self._told_of_compiling:
             self._told_of_compiling = True
             self._print(COMPILING)

@@ -79,6 +79,7 @@ def run(
     from hsslam.cli.running import profile as stages
     from hsslam.cli.running import run_log, summary
     from hsslam.datasets.catalogue import open_dataset
+    from hsslam.datasets.usable import require_returns
     from hsslam.slam.folder import RunFolder
     from hsslam.slam.journal import Header
 
@@ -106,8 +107,10 @@ def run(
         scans=header.dataset["scans"],
         on_error=policy(header.dataset["on_error"]),
     )
-    resolved.matcher.create()  # a matcher that cannot run here is found before a folder is made
+    # What cannot be run is found before a folder is made.
+    resolved.matcher.create()
     if folder is None:
+        require_returns(log)
         folder = RunFolder.create(out, log.info.name, resolved.matcher.name)
     try:
         with progress(quiet) as shown:

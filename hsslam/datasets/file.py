@@ -11,7 +11,7 @@ import numpy as np
 from hsslam.datasets.dataset import DatasetInfo
 from hsslam.errors import DataError
 from hsslam.io.log_statistics import LogStatistics
-from hsslam.io.logs import LogOptions, detect, log_stem, new_statistics, read_log
+from hsslam.io.logs import BAGS, LogOptions, detect, log_stem, new_statistics, read_log
 from hsslam.io.relations import Relations, read_relations
 from hsslam.io.tum import read_tum
 from hsslam.scan import LaserScan
@@ -51,13 +51,16 @@ class FileDataset:
         options: LogOptions | None = None,
     ) -> None:
         self.path = Path(path)
-        title = detect(self.path).title
+        found = detect(self.path)
+        title = found.title
         if scans is not None and scans < 1:
             raise DataError(f"{self.path}: expected at least one scan to be asked for, found {scans}")
         self.statistics: LogStatistics = new_statistics(self.path)
         """Of the newest call of `scans`."""
         self._limit = scans
         self._options = options or LogOptions()
+        if (self._options.scan_topic or self._options.odom_topic) and found.name not in BAGS:
+            raise DataError(f"{self.path}: a {title} has no topics; leave out scan_topic and odom_topic")
         self._count = info.scan_count if info is not None else None
         if scans is not None and self._count is not None:
             self._count = min(scans, self._count)

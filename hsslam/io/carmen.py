@@ -179,7 +179,7 @@ def _scans(
             if on_error == "stop":
                 raise DataError(
                     f"{path}:{number}: {error}; mend or delete the line, or have such lines skipped "
-                    "(on_error skip)"
+                    "(--on-error skip)"
                 ) from error
             statistics.skip(f"line {number}: {error}")
     if not index:
@@ -212,7 +212,12 @@ def _why_no_scans(path: Path, laser: Laser, statistics: CarmenStatistics) -> str
     other: Laser = "rear" if laser == "front" else "front"
     wanted = _message_names(laser)
     there = [name for name in _message_names(other) if name in statistics.ignored]
-    found = ", ".join(there or [repr(n) for n, _ in statistics.ignored.most_common(4)]) or "odometry only"
+    names = [name for name, _ in statistics.ignored.most_common(5) if name != "#"][:4]
+    if not all(name.isprintable() and "\ufffd" not in name for name in names):
+        return f"{path}: expected a CARMEN log, a text file, found a binary one; is it another format's?"
+    found = ", ".join(there or map(repr, names)) or (
+        "odometry only" if statistics.odometry else "no messages"
+    )
     hint = f"; it holds scans of the {other} laser" if there else ""
     return (
         f"{path}: no scans of the {laser} laser in {statistics.lines} lines: expected a CARMEN log with "

@@ -21,7 +21,8 @@ PACKED = ("", ".bz2", ".gz")
 """What may follow the suffix of a text log."""
 
 _MAGIC = {b"#ROSBAG": "ros1", b"SQLite format 3": "ros2", b"\x89MCAP": "mcap", b"PK\x03\x04": "npz"}
-_BAGS = ("ros1", "ros2", "mcap")
+BAGS = ("ros1", "ros2", "mcap")
+"""Formats of ROS bags, which have topics."""
 _GFS_LINES = 20
 
 
@@ -120,7 +121,7 @@ def detect(path: Path | str) -> LogFormat:
     for magic, name in _MAGIC.items():
         if head.startswith(magic):
             (suffix,) = FORMATS[name].suffixes
-            if name in _BAGS and path.suffix != suffix:  # rosbags goes by the name
+            if name in BAGS and path.suffix != suffix:  # rosbags goes by the name
                 raise DataError(f"{path}: holds a {FORMATS[name].title}; rename it to {path.stem}{suffix}")
             return FORMATS[name]
     named = by_suffix(path.name)
@@ -236,7 +237,7 @@ def _writer(name: str) -> Callable[[Path, Iterable[LaserScan]], int]:
         from hsslam.io.range_table import write_range_npz
 
         return write_range_npz
-    if name not in _BAGS:
+    if name not in BAGS:
         raise DataError(f"logs are not written as {name!r}: {FORMATS[name].title}s are read only")
     from hsslam.io.ros_writer import BagKind, write_bag
 

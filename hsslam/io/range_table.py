@@ -24,6 +24,9 @@ from hsslam.se2 import Pose, wrap
 COLUMNS = ("stamp", "x", "y", "theta")
 """Before the ranges in a line of CSV: s, m, m, rad; the pose is the robot's by odometry."""
 
+_TURNS = 1.5
+"""More than any laser's sweep covers; a full one may overlap itself a little."""
+
 _REQUIRED = ("angle_min", "angle_increment")
 _OPTIONAL = {"range_min": 0.0, "range_max": math.inf, "laser_x": 0.0, "laser_y": 0.0, "laser_theta": 0.0}
 
@@ -58,7 +61,7 @@ def read_range_csv(
         words = text.split(b",")
         if beams < 0:
             beams = _header(words, f"{path}:{number}")
-            geometry, laser = _laser(settings, str(path))
+            geometry, laser = _laser(settings, beams, str(path))
             continue
         try:
             stamp, odometry, ranges = _scan(words, beams)
@@ -131,7 +134,7 @@ def read_range_npz(path: Path | str) -> Iterator[LaserScan]:
         stamps = _finite(path, "stamps", _array(path, arrays, "stamps", 1), (count,))
     if "poses" in arrays:
         poses = _finite(path, "poses", _array(path, arrays, "poses", 2), (count, 3))
-    geometry, laser = _laser(settings, str(path))
+    geometry, laser = _laser(settings, ranges.shape[1], str(path))
     if "laser_pose" in arrays:
         laser = _wrapped(_finite(path, "laser_pose", _array(path, arrays, "laser_pose", 1), (3,)))
     for index in range(count):
@@ -183,7 +186,7 @@ def _settings(comment: bytes) -> dict[str, float]:
     return found
 
 
-def _laser(settings: Mapping[str, float], path: str) -> tuple[ScanGeometry, Pose]:
+def _laser(settings: Mapping[str, float], beams: int, path: str) -> tuple[ScanGeometry, Pose]:
     missing = [key for key in _REQUIRED if key not in settings]
     if missing:
         raise DataError(
@@ -196,6 +199,12 @@ def _laser(settings: Mapping[str, float], path: str) -> tuple[ScanGeometry, Pose
     ]
     if bad:
         raise DataError(f"{path}: expected a finite number for {bad[0]}, found none")
+    turns = abs(told["angle_increment"]) * beams / math.tau
+    if turns > _TURNS:
+        raise DataError(
+            f"{path}: {beams} beams, {told['angle_increment']:g} rad apart (angle_increment), would be {turns:.3g} "
+            "turns; expected radians: are these degrees?"
+        )
     geometry = ScanGeometry(*(told[key] for key in (*_REQUIRED, "range_min", "range_max")))
     return geometry, _wrapped(np.array([told["laser_x"], told["laser_y"], told["laser_theta"]]))
 

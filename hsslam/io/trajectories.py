@@ -84,5 +84,8 @@ def with_stamps(trajectory: Trajectory, stamps: np.ndarray[tuple[int], np.dtype[
     """
     beyond = trajectory.indices[trajectory.indices >= len(stamps)]
     if len(beyond):
-        raise DataError(f"the trajectory names scan {beyond[0]}, but the log has {len(stamps):,} scans")
+        raise DataError(
+            f"the trajectory names scan {beyond[0]}, but the log has {len(stamps):,} scans; expected the log that it "
+            "was made from"
+        )
     return Trajectory(stamps[trajectory.indices], trajectory.poses, trajectory.indices)
