@@ -84,6 +84,10 @@ def _load(path: str) -> ModuleType:
     if path in _modules:
         return _modules[path]
     file = Path(path)
+    if file.is_dir():
+        held = file / f"{file.name}.py"
+        hint = f": {held}" if held.is_file() else ""
+        raise ConfigError(f"plugin {path}: expected a Python file, found a folder; name the file in it{hint}")
     if not file.is_file():
         raise ConfigError(f"plugin {path}: no such file")
     # The path is in the module's name: two files of one name must not take each other's place.

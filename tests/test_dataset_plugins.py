@@ -92,3 +92,27 @@ def test_a_broken_one_is_listed_with_its_reason(tmp_path: Path, monkeypatch: pyt
     assert row.rstrip().endswith("hsslam doctor")
     with pytest.raises(UnavailableError, match="dataset 'halfway' is unavailable: ModuleNotFoundError"):
         open_dataset("halfway")
+
+
+def test_one_that_opens_something_else_is_refused_in_a_line(backwards: Path) -> None:
+    file = backwards.with_name("half.py")
+    file.write_text(
+        "from hsslam.datasets.catalogue import register_dataset\n"
+        "from hsslam.datasets.dataset import DatasetInfo, DatasetSource\n"
+        "class Half:\n    def scans(self):\n        return iter(())\n"
+        "register_dataset(DatasetSource(DatasetInfo('half', 'mine', 'not whole'), lambda **options: Half()))\n"
+    )
+    result = CliRunner().invoke(app, ["run", "half", "--plugin", str(file)])
+    assert result.exit_code == 3
+    assert "dataset 'half': expected its source to open a" in result.stderr
+    assert "found a Half without info, truth, relations" in result.stderr
+    listed = CliRunner().invoke(app, ["datasets", "--plugin", str(file)])
+    assert "not whole" in listed.stdout
+
+
+def test_a_folder_named_as_a_plugin_is_told_which_file_was_meant(backwards: Path) -> None:
+    folder = backwards.with_name("mine")
+    folder.mkdir()
+    (folder / "mine.py").write_text("")
+    with pytest.raises(ConfigError, match=r"found a folder; name the file in it: .*mine/mine\.py"):
+        plugin_files.use(folder)

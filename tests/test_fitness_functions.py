@@ -72,3 +72,15 @@ def test_an_installed_package_declares_one(tmp_path: Path) -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "heavy", done.stderr
+
+
+def test_one_that_returns_no_raster_is_named(heavy_tails: None, tmp_path: Path) -> None:
+    file = tmp_path / "none.py"
+    file.write_text(
+        "from hsslam.search import register_fitness\nregister_fitness('empty', lambda *given: None)\n"
+    )
+    plugin_files.use(file)
+    with pytest.raises(
+        ConfigError, match="fitness function 'empty': expected it to return a hsslam.search.Raster"
+    ):
+        create("hide", {"fitness": "empty"}).prepare(np.zeros((5, 2)))

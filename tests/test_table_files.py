@@ -67,9 +67,11 @@ def test_latex_compiles(tmp_path: Path) -> None:
     compiler = shutil.which("pdflatex") or shutil.which("tectonic")
     if compiler is None:
         pytest.skip("LATEX NOT TESTED: no pdflatex, no tectonic")
-    start, end = r"\documentclass{article}\usepackage{booktabs}\begin{document}", r"\end{document}"
-    document = start + to_latex(TABLE, "demo") + end
+    wide = Table("wide", "Wide", "", ["a long heading (m per m)"] * 12, [Row("a_matcher", [BEST] * 12)])
+    start, end = r"\documentclass{article}\usepackage{booktabs,graphicx}\begin{document}", r"\end{document}"
+    document = start + to_latex(TABLE, "demo") + to_latex(wide, "wide") + end
     (tmp_path / "demo.tex").write_text(document)
-    subprocess.run(
+    done = subprocess.run(
         [compiler, "demo.tex"], cwd=tmp_path, check=True, stdin=subprocess.DEVNULL, capture_output=True
     )
+    assert b"Overfull" not in done.stdout

@@ -58,14 +58,19 @@ def to_csv(table: Table) -> str:
 
 
 def to_latex(table: Table, label: str) -> str:
-    r"""A ``table`` float: needs ``\usepackage{booktabs}``; what is best is bold, intervals are below in small."""
+    r"""A ``table`` float: needs ``booktabs`` and ``graphicx``; what is best is bold, intervals are below in small.
+
+    A table wider than the text is made smaller until it fits.
+    """
     columns = len(table.headings)
     lines = [
-        r"% \usepackage{booktabs}",
+        r"% \usepackage{booktabs,graphicx}",
         r"\begin{table}",
         r"\centering",
         rf"\caption{{{_escape(table.title)}. {_escape(table.explanation)}}}",
         rf"\label{{tab:{label}}}",
+        r"\setlength{\tabcolsep}{4pt}",
+        r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
         rf"\begin{{tabular}}{{l{'r' * columns}}}",
         r"\toprule",
         " & ".join(_heading(heading) for heading in (table.corner, *table.headings)) + r" \\",
@@ -73,7 +78,9 @@ def to_latex(table: Table, label: str) -> str:
     ]
     for row in table.rows:
         if row.note:
-            lines.append(rf"{_escape(row.label)} & \multicolumn{{{columns}}}{{l}}{{{_escape(row.note)}}} \\")
+            lines.append(
+                rf"{_escape(row.label)} & \multicolumn{{{columns}}}{{p{{0.7\linewidth}}}}{{{_escape(row.note)}}} \\"
+            )
             continue
         # The sign beside bold, since the caption speaks of it.
         texts = [
@@ -86,7 +93,7 @@ def to_latex(table: Table, label: str) -> str:
                 rf"{{\scriptsize {_escape(cell.interval)}}}" if cell.interval else "" for cell in row.cells
             ]
             lines.append(" & ".join(["", *small]) + r" \\")
-    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", r"\end{table}", ""])
+    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}}", r"\end{table}", ""])
 
 
 def _heading(text: str) -> str:

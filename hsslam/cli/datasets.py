@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from hsslam.cli import console
-from hsslam.cli.options import AsJson, DataDir, OdomTopic, Quiet, Scans, ScanTopic, Seed
+from hsslam.cli.options import AsJson, DataDir, OdomTopic, Plugin, Quiet, Scans, ScanTopic, Seed
 from hsslam.cli.progress import progress
 from hsslam.errors import DataError
 
@@ -19,7 +19,7 @@ _LOG_SUFFIXES = (".clf", ".log", ".clf.gz", ".clf.bz2", ".log.gz", ".log.bz2")
 
 
 @app.callback(invoke_without_command=True)
-def default(context: typer.Context) -> None:
+def default(context: typer.Context, plugin: Plugin = None) -> None:
     """List, inspect, fetch and simulate datasets."""
     if context.invoked_subcommand is None:
         show()

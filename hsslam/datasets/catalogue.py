@@ -213,7 +213,14 @@ def open_dataset(
     name = str(name_or_path)
     if name in _plugins.names():
         source = _plugins.load(name)
-        return source.open(seed=seed, scans=scans, data_dir=data_dir, on_error=on_error)
+        opened = source.open(seed=seed, scans=scans, data_dir=data_dir, on_error=on_error)
+        lacking = [part for part in ("info", "scans", "truth", "relations") if not hasattr(opened, part)]
+        if lacking:
+            raise DataError(
+                f"dataset {name!r}: expected its source to open a hsslam.datasets.dataset.Dataset, found a "
+                f"{type(opened).__name__} without {', '.join(lacking)}"
+            )
+        return opened
     if name in SIMULATED:
         from hsslam.datasets.simulator import SimulatedDataset
 

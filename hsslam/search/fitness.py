@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hsslam.errors import ConfigError
 from hsslam.kernels.fitness import scale
 from hsslam.kernels.raster import Raster
 from hsslam.kernels.surface import Surface
@@ -72,4 +73,9 @@ def build_raster(
     half_side, resolution : float
         Of a square (of ``likelihood``: its standard deviation), and of a cell (m).
     """
-    return load_fitness(name)(points, surface, half_side, resolution)
+    made = load_fitness(name)(points, surface, half_side, resolution)
+    if not isinstance(made, Raster):  # a plugin's may return anything
+        raise ConfigError(
+            f"fitness function {name!r}: expected it to return a hsslam.search.Raster, found {type(made).__name__}"
+        )
+    return made
