@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import re
 import shlex
@@ -18,6 +19,7 @@ from typing import Any
 
 from typer.testing import CliRunner
 
+from hsslam import plugin_files
 from hsslam.cli.main import app
 
 ROOT = Path(__file__).parent.parent
@@ -84,41 +86,37 @@ def write(block: Block, folder: Path) -> None:
 
 
 def run_blocks(document: Path, place: Path) -> Path:
-    """Write a document's files and run its blocks in a shell; the folder where that happened."""
+    """Write a document's files and run its blocks in their order; the folder where that happened.
+
+    All in one process of its own, since what they install must not reach other tests, and a start of Python for
+    every line would take longer than all that they do. The first block of commands is run by a shell instead, as
+    its reader would.
+    """
     shims, site, work = place / "bin", place / "site", place / "work"
-    shims.mkdir()
-    work.mkdir()
+    for folder in (shims, site, work):
+        folder.mkdir()
     pip = shims / "pip"
     pip.write_text(PIP.format(python=sys.executable, target=site))
     pip.chmod(0o755)
     path = os.pathsep.join([str(shims), str(Path(sys.executable).parent), os.environ["PATH"]])
-    import_path = os.pathsep.join(filter(None, [str(site), os.environ.get("PYTHONPATH")]))
+    here = str(Path(__file__).parent)
+    import_path = os.pathsep.join(filter(None, [str(site), here, os.environ.get("PYTHONPATH")]))
     environment = {**os.environ, "PATH": path, "PYTHONPATH": import_path, "MPLBACKEND": "Agg"}
-    ran = 0
-    for block in blocks(document):
-        if block.file is not None:
-            write(block, work)
-        elif block.runs:
-            interpreter = {"sh": ["sh", "-e"], "python": [sys.executable, "-"]}[block.language]
-            done = subprocess.run(
-                interpreter,
-                input=block.text,
-                cwd=work,
-                env=environment,
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-            assert done.returncode == 0, f"{block.text}\n{done.stdout}\n{done.stderr}"
-            ran += 1
-    assert ran >= 5
+    first = next(block for block in blocks(document) if block.runs and block.language == "sh")
+    rest = f"import documents, pathlib; documents.run_blocks_here(pathlib.Path({str(document)!r}), 1)"
+    for command, text in ((["sh", "-e"], first.text), ([sys.executable, "-c", rest], "")):
+        done = subprocess.run(
+            command, input=text, cwd=work, env=environment, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, f"{document.name}\n{done.stdout}\n{done.stderr}"
     return work
 
 
-def run_blocks_here(document: Path) -> int:
+def run_blocks_here(document: Path, skipped: int = 0) -> int:
     """Write a document's files and run its blocks in this process and folder, which is faster; how many ran.
 
-    Shell blocks hold nothing but ``hsslam`` commands; Python blocks share their names.
+    Python blocks share their names. Of the shell's blocks the first ``skipped`` are passed over; other programs than
+    ``hsslam`` are started.
     """
     names: dict[str, Any] = {"__name__": "__main__"}
     ran = 0
@@ -128,6 +126,8 @@ def run_blocks_here(document: Path) -> int:
         elif block.runs:
             if block.language == "python":
                 exec(compile(block.text, block.document, "exec"), names)
+            elif skipped:
+                skipped -= 1
             else:
                 for line in filter(None, block.text.splitlines()):
                     _command(line, small="run=small" in block.marks)
@@ -137,8 +137,14 @@ def run_blocks_here(document: Path) -> int:
 
 def _command(line: str, *, small: bool) -> None:
     program, *words = shlex.split(line, comments=True)
-    assert program == "hsslam", f"{line}: only hsslam is run in this process"
+    if program != "hsslam":
+        subprocess.run([program, *words], check=True)
+        importlib.invalidate_caches()  # it may have been pip
+        return
     if small and "--resume" not in words:
         words += SMALL.get(words[0], [])
+    # What --plugin names holds for the processes of one command, not for the next command.
+    before = os.environ.get(plugin_files.VARIABLE, "")
     done = CliRunner().invoke(app, words, catch_exceptions=False)
+    os.environ[plugin_files.VARIABLE] = before
     assert done.exit_code == 0, f"{line}\n{done.output}"
