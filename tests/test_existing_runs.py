@@ -139,3 +139,11 @@ def test_the_page_of_a_comparison_is_made_anew(page: Path, runs: Path) -> None:
     hsslam("report", page, "--quiet")
     assert (page / "report.html").read_bytes() == before
     assert "own folder" in complains("report", page, runs / "hide")
+
+
+def test_a_trajectory_of_another_system_is_listed_among_those_who_competed(page: Path) -> None:
+    text = (page / "report.html").read_text()
+    start = text.index("Who competed")
+    listed = text[start : text.index("</table>", start)]
+    assert listed.count("not known: a trajectory given as a file") == 1
+    assert "GMapping" in listed and "hide" in listed

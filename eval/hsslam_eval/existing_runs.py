@@ -145,8 +145,8 @@ def _notes(runs: Sequence[ExistingRun], rows: Mapping[str, MatcherOutcome], othe
         )
     if runs:
         told.append(
-            "Times are those in the runs' own folders: `hsslam run` counts compiling, where there was any, "
-            "`hsslam compare` does not."
+            "Times are those in the runs' own folders: hsslam run counts compiling, where there was any, "
+            "hsslam compare does not."
         )
     if others:
         told.append(

@@ -88,10 +88,11 @@ def contestants_table(study: Study) -> Table | None:
     rows: dict[str, Row] = {}
     for comparison in study.comparisons:
         for matcher in comparison.matchers:
-            if not matcher.parameters:
+            if not (matcher.parameters or matcher.runs):  # what could not run is told elsewhere
                 continue
             spent = matcher.trials.evaluations_mean if matcher.trials is not None else 0.0
             given = ", ".join(f"{key} {value}" for key, value in matcher.parameters.items())
+            given = given or "not known: a trajectory given as a file"
             rows.setdefault(
                 matcher.label,
                 Row(
@@ -109,7 +110,7 @@ def contestants_table(study: Study) -> Table | None:
         "contestants",
         "Who competed",
         "Every setting of each matcher, and the mean number of fitness evaluations or iterations of a trial; a dash "
-        "where it does not count them.",
+        "where it does not count them, or where there were no trials.",
         ["matcher", "evaluations per match", "settings"],
         list(rows.values()),
         "name",

@@ -84,7 +84,7 @@ def figures_of(run: SlamOutcome) -> str:
     if accuracy.relations is not None:
         mean, std = (accuracy.relations[f"translation_{what}_m"] for what in ("mean", "std"))
         turn, turn_std = (accuracy.relations[f"rotation_{what}_deg"] for what in ("mean", "std"))
-        parts.append(f"relations {mean:.4f} ± {std:.4f} m, {turn:.3f} ± {turn_std:.3f}°")
+        parts.append(f"Relations {mean:.4f} ± {std:.4f} m, {turn:.3f} ± {turn_std:.3f}°")
     if accuracy.ate is not None:
         parts.append(f"ATE {number(accuracy.ate['translation_rmse_m'])} m")
     if math.isfinite(run.wall_seconds):
