@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -81,5 +82,17 @@ def test_occupied_is_dark_free_is_light_and_unknown_between(mapped: tuple[Occupa
     grid = OccupancyGrid(np.zeros(2), 1.0, np.array([[SURE, 0.0, -SURE]], dtype=np.float32))
     axes = Figure().add_subplot()
     draw_map(axes, grid)
-    occupied, unknown, free = np.asarray(axes.images[0].get_array())[0]
+    (picture,) = axes.images
+    occupied, unknown, free = np.asarray(picture.to_rgba(picture.get_array()))[0, :, 0]
     assert occupied < 0.1 < unknown < 0.9 < free
+
+
+def test_drawing_takes_little_memory(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    grid = OccupancyGrid(np.zeros(2), 0.05, rng.normal(size=(1000, 1000)).astype(np.float32))
+    write_map_png(tmp_path / "first.png", grid)  # imports are none of it
+    tracemalloc.start()
+    write_map_png(tmp_path / "second.png", grid)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 50e6

@@ -41,3 +41,17 @@ def test_a_loop_that_says_something_moves_the_estimate_at_once(relative: NDArray
     graph.update()
     assert not graph.wants_update
     assert np.abs(graph.poses[10] - relative).max() < 0.7 * before
+
+
+def test_a_graph_that_was_optimised_goes_on_from_there() -> None:
+    graph = drifted(0.001)
+    for _ in range(50):
+        graph.add_edge(Edge(0, 10, pose(10.0, 0.0, 0.0), 0.01 * NOISE, "loop"))
+    graph.optimise()
+    for _ in range(10):
+        graph.add_keyframe(pose(1.01, 0.0, 0.0), NOISE)
+    assert graph.poses[20, 0] == pytest.approx(20.1, abs=0.002)
+    graph.add_edge(Edge(0, 20, pose(20.0, 0.0, 0.0), 0.01 * NOISE, "loop"))
+    graph.update()
+    assert graph.poses[20, 0] < 20.06
+    assert graph.poses[10, 0] == pytest.approx(10.0, abs=0.002)

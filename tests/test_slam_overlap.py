@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hsslam.config import Config
 from hsslam.matching import create
 from hsslam.se2 import between, compose, pose
-from hsslam.slam.overlap import SPREAD, choose, match_pairs, overlapping_pairs
+from hsslam.slam.overlap import SPREAD, match_pairs, overlapping_pairs
 
 
 @settings(deadline=None, max_examples=60)
@@ -46,13 +46,6 @@ def test_far_keyframes_make_no_pairs() -> None:
     poses = np.column_stack((10.0 * np.arange(5.0), np.zeros(5), np.zeros(5)))
     assert overlapping_pairs(poses, 3.0, 6) == []
     assert overlapping_pairs(poses[:1], 3.0, 6) == []
-
-
-def test_choose_starts_anew_with_every_second() -> None:
-    first = np.array([5, 6, 9, 1, 5, 4])
-    second = np.array([20, 20, 20, 20, 21, 21])
-    assert choose(first, second, 2, 3).tolist() == [True, False, True, False, True, False]
-    assert choose(first, second, 9, 1).all()
 
 
 def test_matched_pairs_correct_poses_that_are_off() -> None:

@@ -40,6 +40,7 @@ def run_log(
         for event in slam.finish():
             journal.write(event)
         result = slam.result()
+        del slam  # the scans that it keeps would lie beside the picture of the map
         solved = time.perf_counter()
         shown.stage("drawing the map")
         folder.write_result(result, config, title=f"{log.info.name}, {config.matcher.name}")

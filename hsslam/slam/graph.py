@@ -37,6 +37,23 @@ class GraphError(HsslamError):
     """A constraint or a solution is unusable."""
 
 
+class _Incremental:
+    """iSAM2, and what it was not told yet."""
+
+    def __init__(self) -> None:
+        params = gtsam.ISAM2Params()
+        params.relinearizeSkip = 1  # updates are rare: only loops cause them, and a loop moves a lot
+        self._isam = gtsam.ISAM2(params)
+        self.factors = gtsam.NonlinearFactorGraph()
+        self.values = gtsam.Values()
+
+    def solve(self) -> Any:
+        self._isam.update(self.factors, self.values)
+        self.factors = gtsam.NonlinearFactorGraph()
+        self.values = gtsam.Values()
+        return self._isam.calculateEstimate()
+
+
 class PoseGraph:
     """Keyframe poses and the constraints between them.
 
@@ -60,13 +77,9 @@ class PoseGraph:
         self._poses = np.empty((1024, 3))
         self._poses[0] = start
         self._count = 1
-        params = gtsam.ISAM2Params()
-        params.relinearizeSkip = 1  # updates are rare: only loops cause them, and a loop moves a lot
-        self._isam = gtsam.ISAM2(params)
-        self._new_factors = gtsam.NonlinearFactorGraph()
-        self._new_values = gtsam.Values()
-        self._new_values.insert(0, _pose2(start))
-        self._new_factors.add(_prior(start))
+        self._incremental: _Incremental | None = _Incremental()
+        self._incremental.values.insert(0, _pose2(start))
+        self._incremental.factors.add(_prior(start))
 
     def __len__(self) -> int:
         return self._count
@@ -84,7 +97,8 @@ class PoseGraph:
             self._poses = np.concatenate((self._poses, np.empty_like(self._poses)))
         self._poses[self._count] = compose(self._poses[newest], relative)
         self._count += 1
-        self._new_values.insert(self._count - 1, _pose2(self._poses[self._count - 1]))
+        if self._incremental is not None:
+            self._incremental.values.insert(self._count - 1, _pose2(self._poses[self._count - 1]))
 
     def add_edge(self, edge: Edge) -> None:
         """Add a constraint between two keyframes that exist."""
@@ -100,19 +114,23 @@ class PoseGraph:
     def update(self) -> None:
         """Bring the estimate up to date with iSAM2."""
         self._loop_waits = False
-        self._isam.update(self._new_factors, self._new_values)
-        self._new_factors = gtsam.NonlinearFactorGraph()
-        self._new_values = gtsam.Values()
-        self._take(self._isam.calculateEstimate())
+        if self._incremental is None:
+            self._incremental = _Incremental()
+            self._incremental.factors, self._incremental.values = self._problem(self._is_robust)
+        self._take(self._incremental.solve())
 
     def optimise(self, *, robust: bool = True) -> tuple[float, float, NDArray[np.bool_]]:
         """Optimise all poses at once (Levenberg-Marquardt; graduated non-convexity if the config asks for it).
+
+        What iSAM2 keeps is let go: it knows neither these poses nor all constraints. An `update` that comes
+        later starts it anew, from both.
 
         Returns
         -------
         (float, float, bool (E,))
             Nonlinear error before and after, and which of `edges` the solution does not believe.
         """
+        self._incremental = None
         loss = self._config.robust if robust else "none"
         graph, values = self._problem(loss == "cauchy")
         before = graph.error(values)
@@ -189,7 +207,12 @@ class PoseGraph:
             if math.hypot(error[0], error[1]) < NEXT_TO_NOTHING_XY and abs(error[2]) < NEXT_TO_NOTHING_THETA:
                 return
             self._loop_waits = True
-        self._new_factors.add(self._factor(edge, edge.kind != "odometry" and self._config.robust != "none"))
+        if self._incremental is not None:
+            self._incremental.factors.add(self._factor(edge, self._is_robust))
+
+    @property
+    def _is_robust(self) -> bool:
+        return self._config.robust != "none"
 
     def _factor(self, edge: Edge, robust: bool) -> Any:
         noise: Any = gtsam.noiseModel.Gaussian.Covariance(body_covariance(edge))

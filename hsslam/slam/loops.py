@@ -136,6 +136,10 @@ class LoopCloser:
             surprise=surprise,
         )
 
+    def release(self) -> None:
+        """Let go of the prepared submaps; those that are wanted again are prepared again."""
+        self._places.clear()
+
     def ambiguity(self, loop: LoopChecked, points: Sequence[Points], poses: Poses) -> float:
         """Score of the best answer elsewhere in the widest window, over that of the loop's own answer."""
         with self._stopwatch.measure("ambiguity"):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from hsslam.config import Config
 from hsslam.jit import kernel
 from hsslam.matching.interface import Matcher, Reference, SearchWindow
-from hsslam.se2 import Points, Poses, between
+from hsslam.se2 import Points, Poses, between, wrap
 from hsslam.slam.events import Edge
 from hsslam.slam.randomness import Purpose, generator
 
@@ -29,36 +29,47 @@ def overlapping_pairs(poses: Poses, radius: float, neighbours: int) -> list[tupl
     The nearest come first; of keyframes that follow one another only every third is taken, so that all visits
     to a place are tied together. Consecutive keyframes are no pair: they have a constraint.
     """
-    from scipy.spatial import KDTree
-
-    near = KDTree(poses[:, :2]).query_pairs(radius, output_type="ndarray")
-    first, second = np.sort(near.reshape(-1, 2), axis=1).T
-    apart = second - first > 1
-    first, second = first[apart].astype(np.int64), second[apart].astype(np.int64)
-    offsets = poses[first] - poses[second]
-    turned = np.abs((offsets[:, 2] + math.pi) % (2 * math.pi) - math.pi)
-    cost = np.hypot(offsets[:, 0], offsets[:, 1]) + 0.5 * turned
-    order = np.lexsort((first, cost, second))
-    chosen = choose(first[order], second[order], neighbours, SPREAD)
-    return sorted(zip(first[order][chosen].tolist(), second[order][chosen].tolist(), strict=True))
+    pairs = nearest_apart(poses, radius, neighbours, SPREAD)
+    return sorted(zip(pairs[:, 0].tolist(), pairs[:, 1].tolist(), strict=True))
 
 
 @kernel
-def choose(first: NDArray[np.int64], second: NDArray[np.int64], most: int, spread: int) -> NDArray[np.bool_]:
-    """Which pairs to take, the best of each ``second`` first, no two ``first`` of it nearer than ``spread``."""
-    chosen = np.zeros(len(first), dtype=np.bool_)
-    start = 0
-    for k in range(len(first)):
-        if second[k] != second[start]:
-            start = k
-        count = 0
-        free = True
-        for j in range(start, k):
-            if chosen[j]:
-                count += 1
-                free = free and abs(first[j] - first[k]) >= spread
-        chosen[k] = free and count < most
-    return chosen
+def nearest_apart(poses: Poses, radius: float, most: int, spread: int) -> NDArray[np.int64]:
+    """Pairs (P, 2), in the order of their second: ``most`` of each at most, no two firsts of it nearer than ``spread``.
+
+    One second at a time: of a place that was visited n times there are n squared pairs, too many to hold.
+    """
+    count = poses.shape[0]
+    by_x = np.argsort(poses[:, 0])
+    sorted_x = poses[by_x, 0]
+    pairs = np.empty((count * most, 2), dtype=np.int64)
+    found = 0
+    for second in range(count):
+        x, y, theta = poses[second, 0], poses[second, 1], poses[second, 2]
+        low = np.searchsorted(sorted_x, x - radius)
+        high = np.searchsorted(sorted_x, x + radius, side="right")
+        near = np.sort(by_x[low:high])
+        costs = np.empty(len(near))
+        kept = 0
+        for first in near:
+            if first >= second - 1:
+                break
+            distance = math.hypot(poses[first, 0] - x, poses[first, 1] - y)
+            if distance <= radius:
+                near[kept] = first
+                costs[kept] = distance + 0.5 * abs(wrap(poses[first, 2] - theta))
+                kept += 1
+        begin = found
+        for k in np.argsort(costs[:kept], kind="mergesort"):
+            if found - begin == most:
+                break
+            free = True
+            for taken in pairs[begin:found, 0]:
+                free = free and abs(taken - near[k]) >= spread
+            if free:
+                pairs[found, 0], pairs[found, 1] = near[k], second
+                found += 1
+    return pairs[:found]
 
 
 def match_pairs(

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hsslam.config import Config
 from hsslam.errors import DataError
 from hsslam.scan import LaserScan
-from hsslam.se2 import Points, Pose, between, compose
+from hsslam.se2 import Points, between_many, compose, compose_many
 from hsslam.slam.events import (
     Edge,
     Event,
@@ -25,6 +24,7 @@ from hsslam.slam.journal import Replay
 from hsslam.slam.loops import LoopCloser
 from hsslam.slam.overlap import match_pairs, overlapping_pairs
 from hsslam.slam.rescan import match_scans, smooth
+from hsslam.slam.scan_table import ScanTable
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.tracker import TrackedScan, Tracker
 from hsslam.slam.verification import LoopVerifier
@@ -61,14 +61,7 @@ class Slam:
         self._keyframes: list[LaserScan] = []
         self._points: list[Points] = []
         self._loops: list[LoopChecked] = []
-        self._stamps: list[float] = []
-        self._odometry: list[Pose] = []
-        self._anchors: list[int] = []
-        self._relatives: list[Pose] = []
-        self._online: list[Pose] = []
-        self._scans: list[Points] = []
-        self._motions: list[Pose] = []
-        self._noises: list[NDArray[np.float64]] = []
+        self._scans = ScanTable()
         self._matched = 0
         self._evaluations = 0
 
@@ -109,7 +102,7 @@ class Slam:
             return
         self._tracker.add_keyframe(scan.robot_points, tracked)
         self._graph.add_keyframe(tracked.relative, tracked.covariance)
-        self._anchors[-1], self._relatives[-1] = newest + 1, np.zeros(3)
+        self._scans.becomes_keyframe(newest + 1)
         yield self._keep(scan)
         yield from self._close_loops()
 
@@ -123,6 +116,7 @@ class Slam:
         """
         graph = self._require_graph()
         yield from self._settle(self._verifier.close())
+        self._closer.release()
         yield self._optimise("final")
         for stage in range(self._config.graph.refine_rounds):
             with self._stopwatch.measure("final"):
@@ -140,12 +134,18 @@ class Slam:
 
     def _rescan(self, graph: PoseGraph) -> None:
         """Match every scan against the finished map, and hang it on its keyframe anew."""
-        anchors, relatives = np.array(self._anchors), np.array(self._relatives)
+        scans = self._scans
         found, covariances, matched = match_scans(
-            self._config, self._matcher, self._points, graph.poses, self._scans, anchors, relatives
+            self._config,
+            self._matcher,
+            self._points,
+            graph.poses,
+            scans.points,
+            scans.anchors,
+            scans.relatives,
         )
-        poses = smooth(found, covariances, matched, np.array(self._motions), np.array(self._noises))
-        self._relatives = [between(graph.poses[k], pose) for k, pose in zip(anchors, poses, strict=True)]
+        poses = smooth(found, covariances, matched, scans.motions, scans.noises)
+        scans.relatives[:] = between_many(graph.poses[scans.anchors], poses)
 
     def result(self) -> SlamResult:
         """Poses of every scan seen so far, and all that led to them.
@@ -156,15 +156,13 @@ class Slam:
             If there was no scan.
         """
         graph = self._require_graph()
-        stamps = np.array(self._stamps)
-        indices = np.arange(len(stamps), dtype=np.int64)
-        poses = np.array(
-            [compose(graph.poses[k], r) for k, r in zip(self._anchors, self._relatives, strict=True)]
-        )
+        scans = self._scans
+        stamps, indices = scans.stamps.copy(), np.arange(len(scans), dtype=np.int64)
+        poses = compose_many(graph.poses[scans.anchors], scans.relatives)
         return SlamResult(
             trajectory=Trajectory(stamps, poses, indices),
-            online=Trajectory(stamps, np.array(self._online), indices),
-            odometry=Trajectory(stamps, np.array(self._odometry), indices),
+            online=Trajectory(stamps, scans.online.copy(), indices),
+            odometry=Trajectory(stamps, scans.odometry.copy(), indices),
             keyframes=self._keyframes,
             keyframe_poses=graph.poses.copy(),
             edges=graph.edges,
@@ -215,14 +213,16 @@ class Slam:
 
     def _record(self, scan: LaserScan, keyframe: int, tracked: TrackedScan) -> Tracked:
         pose = compose(self._require_graph().poses[keyframe], tracked.relative)
-        self._stamps.append(scan.stamp)
-        self._odometry.append(scan.odometry)
-        self._anchors.append(keyframe)
-        self._relatives.append(tracked.relative)
-        self._online.append(pose)
-        self._scans.append(scan.robot_points.astype(np.float32))
-        self._motions.append(self._tracker.motion)
-        self._noises.append(self._tracker.noise)
+        self._scans.append(
+            scan.stamp,
+            scan.odometry,
+            pose,
+            keyframe,
+            tracked.relative,
+            self._tracker.motion,
+            self._tracker.noise,
+            scan.robot_points,
+        )
         self._matched += tracked.matched
         self._evaluations += tracked.evaluations
         return Tracked(

@@ -45,7 +45,7 @@ def match_scans(
     matcher: Matcher[Any],
     keyframe_points: Sequence[Points],
     poses: Poses,
-    scans: Sequence[Points],
+    scans: Sequence[NDArray[np.float32]],
     anchors: NDArray[np.int64],
     relatives: Poses,
 ) -> tuple[Poses, NDArray[np.float64], NDArray[np.bool_]]:
@@ -59,8 +59,8 @@ def match_scans(
         The tracker's.
     keyframe_points, poses : sequence, Poses
         Of the keyframes, as optimised.
-    scans : sequence of Points
-        (N_i, 2) m of every scan, in the robot's frame.
+    scans : sequence of float32 (N_i, 2)
+        Returns of every scan in the robot's frame (m).
     anchors : int64 (S,)
         Number of the keyframe each scan hangs on; ascending.
     relatives : Poses
@@ -90,7 +90,7 @@ def match_scans(
             expected = compose(poses[anchors[i]], relatives[i])
             guess = between(origin, expected)
             rng = generator(config.seed, Purpose.SCAN, i)
-            result = matcher.match(reference, scans[i], guess, window, rng)
+            result = matcher.match(reference, scans[i].astype(np.float64), guess, window, rng)
             matched[i] = result.converged and result.score >= rules.overlap_min_score
             found[i] = compose(origin, result.pose) if matched[i] else expected
             covariances[i] = rotated(result.covariance, -origin[2])
@@ -135,5 +135,5 @@ def smooth(
             robust = gtsam.noiseModel.Robust.Create(gtsam.noiseModel.mEstimator.Cauchy.Create(2.0), noise)
             graph.add(gtsam.BetweenFactorPose2(i - 1, i, gtsam.Pose2(*motions[i]), robust))
     solution = gtsam.LevenbergMarquardtOptimizer(graph, values).optimize()
-    out: Poses = gtsam.utilities.extractPose2(solution)
+    out: Poses = np.ascontiguousarray(gtsam.utilities.extractPose2(solution))
     return out
