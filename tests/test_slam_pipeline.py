@@ -16,7 +16,8 @@ from hsslam.errors import DataError
 from hsslam.scan import LaserScan, ScanGeometry
 from hsslam.se2 import between, between_many, compose, pose
 from hsslam.slam.events import Edge, Event, KeyframeAdded, LoopChecked, Optimised, SlamResult, Tracked
-from hsslam.slam.graph import GraphError, PoseGraph, body_covariance
+from hsslam.slam.factors import GraphError, body_covariance
+from hsslam.slam.graph import PoseGraph
 from hsslam.slam.journal import Replay
 from hsslam.slam.pipeline import Slam
 from hsslam.slam.recovery import steps_along

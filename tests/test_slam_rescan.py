@@ -12,7 +12,7 @@ from hsslam.config import Config
 from hsslam.datasets.simulator import SimulatedDataset
 from hsslam.matching import create
 from hsslam.se2 import between, between_many, compose, compose_many, pose
-from hsslam.slam.graph import FLOOR_STD_THETA, FLOOR_STD_XY
+from hsslam.slam.factors import FLOOR_STD_THETA, FLOOR_STD_XY
 from hsslam.slam.rescan import match_scans, smooth, surrounding
 
 Array = NDArray[np.float64]

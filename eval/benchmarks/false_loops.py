@@ -88,7 +88,7 @@ class Unfinished:
         before = self._slam.result()
         self.poses: Poses = before.keyframe_poses
         self._edges = list(before.edges)
-        self._relatives = list(self._slam._relatives)
+        self._relatives = self._slam._scans.relatives.copy()
 
     @property
     def true_loops(self) -> int:
@@ -102,7 +102,7 @@ class Unfinished:
         )
         slam, graph = self._slam, self._slam._require_graph()
         slam._config, graph._config = config, config.graph
-        slam._relatives = list(self._relatives)
+        slam._scans.relatives[:] = self._relatives
         graph.edges = list(self._edges)
         graph.poses[:] = self.poses
         for edge in false:

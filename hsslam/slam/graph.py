@@ -10,19 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import GraphSection
-from hsslam.errors import HsslamError
 from hsslam.se2 import Pose, Poses, between, compose
 from hsslam.slam.events import Edge
-from hsslam.slam.fusion import is_positive_definite, rotated
+from hsslam.slam.factors import GraphError, between_factor, body_covariance, pose2, prior_factor
+from hsslam.slam.fusion import rotated
+from hsslam.slam.incremental import Incremental
+from hsslam.slam.near import NearIndex
 from hsslam.slam.uncertainty import RelativeUncertainty
-
-PRIOR_STD = 1e-4
-"""Of the first keyframe (m, rad): it defines the frame of the map."""
-
-FLOOR_STD_XY = 0.004
-FLOOR_STD_THETA = math.radians(0.1)
-"""No relative pose is trusted beyond this: errors that matches share do not show in their covariances."""
-
 
 NEXT_TO_NOTHING_XY = 0.02
 NEXT_TO_NOTHING_THETA = math.radians(0.3)
@@ -33,25 +27,13 @@ would grow with the log. An error that is still too small to matter grows until 
 """
 
 
-class GraphError(HsslamError):
-    """A constraint or a solution is unusable."""
+REACHES_BACK_XY = 0.10
+REACHES_BACK_THETA = math.radians(2.0)
+REACHES_BACK_STD = 0.05
+"""A loop that disagrees by more than this (m, rad) over a way that was not known to this deviation (m) moves all.
 
-
-class _Incremental:
-    """iSAM2, and what it was not told yet."""
-
-    def __init__(self) -> None:
-        params = gtsam.ISAM2Params()
-        params.relinearizeSkip = 1  # updates are rare: only loops cause them, and a loop moves a lot
-        self._isam = gtsam.ISAM2(params)
-        self.factors = gtsam.NonlinearFactorGraph()
-        self.values = gtsam.Values()
-
-    def solve(self) -> Any:
-        self._isam.update(self.factors, self.values)
-        self.factors = gtsam.NonlinearFactorGraph()
-        self.values = gtsam.Values()
-        return self._isam.calculateEstimate()
+One that contradicts what the graph is sure of is more likely to be false than to be news of long ago.
+"""
 
 
 class PoseGraph:
@@ -77,9 +59,10 @@ class PoseGraph:
         self._poses = np.empty((1024, 3))
         self._poses[0] = start
         self._count = 1
-        self._incremental: _Incremental | None = _Incremental()
-        self._incremental.values.insert(0, _pose2(start))
-        self._incremental.factors.add(_prior(start))
+        self._robust_scale = config.robust_scale if config.robust != "none" else None
+        self._incremental: Incremental | None = Incremental(start, self._robust_scale)
+        self.near = NearIndex()
+        self.near.add(start)
 
     def __len__(self) -> int:
         return self._count
@@ -97,12 +80,11 @@ class PoseGraph:
             self._poses = np.concatenate((self._poses, np.empty_like(self._poses)))
         self._poses[self._count] = compose(self._poses[newest], relative)
         self._count += 1
-        if self._incremental is not None:
-            self._incremental.values.insert(self._count - 1, _pose2(self._poses[self._count - 1]))
+        self.near.add(self._poses[self._count - 1])
 
     def add_edge(self, edge: Edge) -> None:
-        """Add a constraint between two keyframes that exist."""
-        if not 0 <= edge.first < self._count or not 0 <= edge.second < self._count:
+        """Add a constraint between two keyframes that exist, the earlier one first."""
+        if not 0 <= edge.first < edge.second < self._count:
             raise GraphError(f"a constraint names keyframes {edge.first} and {edge.second}, of {self._count}")
         self._add(edge)
 
@@ -115,9 +97,11 @@ class PoseGraph:
         """Bring the estimate up to date with iSAM2."""
         self._loop_waits = False
         if self._incremental is None:
-            self._incremental = _Incremental()
-            self._incremental.factors, self._incremental.values = self._problem(self._is_robust)
-        self._take(self._incremental.solve())
+            self._incremental = Incremental(self._start, self._robust_scale)
+            for edge in self.edges:
+                self._incremental.add(edge)
+        self._incremental.solve(self.poses)
+        self.near.rebuild(self.poses)
 
     def optimise(self, *, robust: bool = True) -> tuple[float, float, NDArray[np.bool_]]:
         """Optimise all poses at once (Levenberg-Marquardt; graduated non-convexity if the config asks for it).
@@ -159,12 +143,12 @@ class PoseGraph:
 
     def _problem(self, robust: bool) -> tuple[Any, Any]:
         graph = gtsam.NonlinearFactorGraph()
-        graph.add(_prior(self._start))
+        graph.add(prior_factor(self._start))
         for edge in self.edges:
-            graph.add(self._factor(edge, robust))
+            graph.add(between_factor(edge, self._config.robust_scale if robust else None))
         values = gtsam.Values()
         for key, pose in enumerate(self.poses):
-            values.insert(key, _pose2(pose))
+            values.insert(key, pose2(pose))
         return graph, values
 
     def _solve(self, graph: Any, values: Any, loss: str) -> Any:
@@ -195,60 +179,34 @@ class PoseGraph:
                 "the pose graph's solution is not finite; a constraint or its covariance is unusable"
             )
         self._poses[: self._count] = poses
+        self.near.rebuild(self.poses)
 
     def _add(self, edge: Edge) -> None:
         self.edges.append(edge)
         covariance = body_covariance(edge)
+        news = edge.kind != "loop" or self._says_something(edge)
+        reaches_back = edge.kind == "loop" and news and self._reaches_back(edge)
         if edge.kind != "overlap":
             spread = 0.5 * (covariance[0, 0] + covariance[1, 1])
             self.uncertainty.add(edge.first, edge.second, spread, covariance[2, 2])
-        if edge.kind == "loop":
-            error = between(edge.relative, between(self._poses[edge.first], self._poses[edge.second]))
-            if math.hypot(error[0], error[1]) < NEXT_TO_NOTHING_XY and abs(error[2]) < NEXT_TO_NOTHING_THETA:
-                return
-            self._loop_waits = True
+        if not news:
+            return
+        self._loop_waits = self._loop_waits or edge.kind == "loop"
         if self._incremental is not None:
-            self._incremental.factors.add(self._factor(edge, self._is_robust))
+            self._incremental.add(edge, reaches_back=reaches_back)
 
-    @property
-    def _is_robust(self) -> bool:
-        return self._config.robust != "none"
+    def _says_something(self, edge: Edge) -> bool:
+        distance, turn = self._disagreement(edge)
+        return distance >= NEXT_TO_NOTHING_XY or turn >= NEXT_TO_NOTHING_THETA
 
-    def _factor(self, edge: Edge, robust: bool) -> Any:
-        noise: Any = gtsam.noiseModel.Gaussian.Covariance(body_covariance(edge))
-        if robust and edge.kind != "odometry":
-            loss = gtsam.noiseModel.mEstimator.Cauchy.Create(self._config.robust_scale)
-            noise = gtsam.noiseModel.Robust.Create(loss, noise)
-        return gtsam.BetweenFactorPose2(edge.first, edge.second, _pose2(edge.relative), noise)
+    def _reaches_back(self, edge: Edge) -> bool:
+        distance, turn = self._disagreement(edge)
+        if distance < REACHES_BACK_XY and turn < REACHES_BACK_THETA:
+            return False
+        ((variance, _),) = self.uncertainty.seen_from(edge.second, np.array([edge.first]), self.poses)
+        return bool(variance > REACHES_BACK_STD**2)
 
-
-def body_covariance(edge: Edge) -> NDArray[np.float64]:
-    """Covariance (3, 3) of an edge as GTSAM wants it: in the frame of the second pose, with a floor.
-
-    Raises
-    ------
-    GraphError
-        If the edge's pose is not finite, or its covariance not finite and positive definite; GTSAM itself
-        accepts both without a word.
-    """
-    covariance = edge.covariance
-    if not np.isfinite(edge.relative).all():
-        raise GraphError(f"the constraint between keyframes {edge.first} and {edge.second} is not finite")
-    if not is_positive_definite(covariance):
-        raise GraphError(
-            f"the covariance of the constraint between keyframes {edge.first} and {edge.second} "
-            "is not positive definite"
-        )
-    turned = rotated(covariance, edge.relative[2])
-    turned[0, 0] += FLOOR_STD_XY**2
-    turned[1, 1] += FLOOR_STD_XY**2
-    turned[2, 2] += FLOOR_STD_THETA**2
-    return turned
-
-
-def _prior(start: Pose) -> Any:
-    return gtsam.PriorFactorPose2(0, _pose2(start), gtsam.noiseModel.Isotropic.Sigma(3, PRIOR_STD))
-
-
-def _pose2(pose: Pose) -> Any:
-    return gtsam.Pose2(pose[0], pose[1], pose[2])
+    def _disagreement(self, edge: Edge) -> tuple[float, float]:
+        """How far an edge is from the estimate (m, rad)."""
+        error = between(edge.relative, between(self._poses[edge.first], self._poses[edge.second]))
+        return math.hypot(error[0], error[1]), abs(error[2])

@@ -15,11 +15,11 @@ from hsslam.matching.interface import Matcher, Reference, SearchWindow
 from hsslam.se2 import Points, Pose, Poses, between, compose, inverse, wrap
 from hsslam.slam.events import LoopChecked
 from hsslam.slam.fusion import rotated, squared_mahalanobis
+from hsslam.slam.graph import PoseGraph
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.recovery import best_elsewhere
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import merge
-from hsslam.slam.uncertainty import RelativeUncertainty
 from hsslam.slam.windows import foreseen_window, match_within, search_window
 
 REFERENCES_KEPT = 10
@@ -80,29 +80,40 @@ class LoopCloser:
         self._tile = search_window(config.tracker.window)
         self._places: dict[int, _Place] = {}
 
-    def candidates(self, poses: Poses, uncertainty: RelativeUncertainty) -> list[Candidate]:
+    def candidates(self, graph: PoseGraph) -> list[Candidate]:
         """Keyframes worth trying against the newest one, nearest first, not two of the same place."""
         rules = self._config.loops
-        newest = len(poses) - 1
+        newest = len(graph) - 1
         if not rules.enabled or newest % rules.every or newest <= rules.min_gap:
             return []
-        offsets = poses[: newest - rules.min_gap, :2] - poses[newest, :2]
-        distances = np.hypot(offsets[:, 0], offsets[:, 1])
-        near = np.flatnonzero(distances <= rules.radius + 2.0 * self._widest.half_x)
-        if len(near) == 0:
-            return []
-        near = near[np.argsort(distances[near], kind="stable")][:NEAREST]
         with self._stopwatch.measure("candidates"):
-            variances = uncertainty.seen_from(newest, near, poses)
-        chosen: list[Candidate] = []
-        for i, (xy, theta) in zip(near, variances, strict=True):
+            farthest = rules.radius + 2.0 * self._widest.half_x
+            near, distances = graph.near.of(newest, newest - rules.min_gap, farthest, NEAREST)
+            # Those within the radius are candidates however well they are known; mostly there are enough of them.
+            inside = distances <= rules.radius
+            targets = self._apart(near[inside])
+            if len(targets) < rules.candidates:
+                targets = np.concatenate((targets, near[~inside]))
+            variances = graph.uncertainty.seen_from(newest, targets, graph.poses)
+        known = dict(zip(targets.tolist(), variances.tolist(), strict=True))
+        reach = dict(zip(near.tolist(), distances.tolist(), strict=True))
+        reachable = [
+            first
+            for first, (xy, _) in known.items()
+            if reach[first] <= rules.radius + 2.0 * min(math.sqrt(xy), self._widest.half_x)
+        ]
+        return [Candidate(first, *known[first]) for first in self._apart(np.array(reachable)).tolist()]
+
+    def _apart(self, near: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The first of some keyframes, as many as are to be tried, no two of the same place."""
+        rules = self._config.loops
+        chosen: list[int] = []
+        for i in near:
             if len(chosen) == rules.candidates:
                 break
-            if distances[i] > rules.radius + 2.0 * min(math.sqrt(xy), self._widest.half_x):
-                continue
-            if all(abs(int(i) - other.first) > rules.submap_size for other in chosen):
-                chosen.append(Candidate(int(i), float(xy), float(theta)))
-        return chosen
+            if all(abs(int(i) - other) > rules.submap_size for other in chosen):
+                chosen.append(int(i))
+        return np.array(chosen, dtype=np.int64)
 
     def match(
         self, candidate: Candidate, points: Sequence[Points], poses: Poses, known: LoopChecked | None = None

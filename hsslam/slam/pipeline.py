@@ -177,7 +177,7 @@ class Slam:
         graph = self._require_graph()
         second = len(graph) - 1
         settled = self._verifier.expire(second)
-        for candidate in self._closer.candidates(graph.poses, graph.uncertainty):
+        for candidate in self._closer.candidates(graph):
             known = self._replay.loops.get((candidate.first, second))
             loop = self._closer.match(candidate, self._points, graph.poses, known)
             self._evaluations += loop.evaluations

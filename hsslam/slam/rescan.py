@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from hsslam.config import Config
 from hsslam.matching.interface import Matcher, SearchWindow
 from hsslam.se2 import Points, Pose, Poses, between, compose
+from hsslam.slam.factors import FLOOR_STD_THETA, FLOOR_STD_XY
 from hsslam.slam.fusion import rotated
-from hsslam.slam.graph import FLOOR_STD_THETA, FLOOR_STD_XY
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.submap import merge
 

@@ -30,6 +30,7 @@ class RelativeUncertainty:
         self._links = np.empty((_ROOM, 2), dtype=np.int64)
         self._variances = np.empty((_ROOM, 2))
         self._count = 0
+        self._search = _Scratch(_ROOM)
 
     def add(self, first: int, second: int, variance_xy: float, variance_theta: float) -> None:
         """Add a constraint between two keyframes: variances of its position (m^2) and heading (rad^2)."""
@@ -59,7 +60,32 @@ class RelativeUncertainty:
         float64 (T, 2)
             m^2 and rad^2; infinite where no path leads.
         """
-        return least_variances(self._first_link, self._links, self._variances, newest, targets, poses)
+        if len(self._search.best) < len(poses):
+            self._search = _Scratch(len(self._first_link))
+        search = self._search
+        search.number += 1
+        return least_variances(
+            self._first_link,
+            self._links,
+            self._variances,
+            newest,
+            targets,
+            poses,
+            search.best,
+            search.heading,
+            search.marks,
+            search.number,
+        )
+
+
+class _Scratch:
+    """What a search writes on: kept, for to clear it would cost more than the search, once keyframes are many."""
+
+    def __init__(self, size: int) -> None:
+        self.best = np.empty(size)
+        self.heading = np.empty(size)
+        self.marks = np.zeros((size, 3), dtype=np.int64)
+        self.number = 0
 
 
 @kernel
@@ -70,30 +96,31 @@ def least_variances(
     newest: int,
     targets: NDArray[np.int64],
     poses: Poses,
+    best: NDArray[np.float64],
+    heading: NDArray[np.float64],
+    marks: NDArray[np.int64],
+    number: int,
 ) -> NDArray[np.float64]:
     """Sums of variances along the shortest paths from ``newest`` to ``targets``, (T, 2); Dijkstra's algorithm.
 
     The length of a link is the position variance that it adds at ``newest``: its own, and that of its heading
-    times the squared distance. The search ends when every target is reached.
+    times the squared distance. The search ends when every target is reached. ``best``, ``heading`` and ``marks``
+    (seen, done, wanted) hold anything at first, but no mark that equals ``number``.
     """
-    count = poses.shape[0]
-    best = np.full(count, np.inf)
-    heading = np.full(count, np.inf)
-    done = np.zeros(count, dtype=np.bool_)
-    wanted = np.zeros(count, dtype=np.bool_)
     left = 0
     for k in range(len(targets)):
-        if not wanted[targets[k]]:
-            wanted[targets[k]] = True
+        if marks[targets[k], 2] != number:
+            marks[targets[k], 2] = number
             left += 1
     best[newest], heading[newest] = 0.0, 0.0
+    marks[newest, 0] = number
     heap = [(0.0, newest)]
     while len(heap) > 0 and left > 0:
         cost, here = heapq.heappop(heap)
-        if done[here]:
+        if marks[here, 1] == number:
             continue
-        done[here] = True
-        if wanted[here]:
+        marks[here, 1] = number
+        if marks[here, 2] == number:
             left -= 1
         dx, dy = poses[here, 0] - poses[newest, 0], poses[here, 1] - poses[newest, 1]
         squared = dx * dx + dy * dy
@@ -101,14 +128,16 @@ def least_variances(
         while link >= 0:
             there = links[link, 0]
             reached = cost + variances[link, 0] + variances[link, 1] * squared
-            if reached < best[there]:
+            if marks[there, 0] != number or reached < best[there]:
+                marks[there, 0] = number
                 best[there] = reached
                 heading[there] = heading[here] + variances[link, 1]
                 heapq.heappush(heap, (reached, there))
             link = links[link, 1]
-    out = np.empty((len(targets), 2))
+    out = np.full((len(targets), 2), np.inf)
     for k in range(len(targets)):
-        out[k, 0], out[k, 1] = best[targets[k]], heading[targets[k]]
+        if marks[targets[k], 0] == number:
+            out[k, 0], out[k, 1] = best[targets[k]], heading[targets[k]]
     return out
 
 
