@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hsslam.slam.uncertainty import RelativeUncertainty
+from hsslam.slam.uncertainty import MOST_LINKS, RelativeUncertainty
 
 Link = tuple[int, int, float, float]
 
@@ -79,3 +79,16 @@ def test_there_is_room_for_more_keyframes_and_links_than_at_first() -> None:
     links, poses = chain(9000)
     found = told(links).seen_from(8999, np.array([0]), poses)
     assert found[0, 1] == pytest.approx(8999e-5)
+
+
+def test_where_ever_more_paths_meet_some_are_left_out_and_none_is_made_up() -> None:
+    links, poses = chain(4 * MOST_LINKS)
+    hub = [(0, second, 1e-6, 1e-7) for second in range(10, len(poses))]
+    newest = len(poses) - 1
+    every = np.arange(newest)
+    found = told([*links, *hub]).seen_from(newest, every, poses)
+    best = by_relaxation([*links, *hub], newest, poses)[:-1]
+    assert found[0] == pytest.approx(best[0])  # the way back to what is old is as good as ever
+    assert (found >= best * (1.0 - 1e-9)).all()
+    assert (found[:, 0] > 1.5 * best[:, 0]).any()
+    assert np.isfinite(found).all()

@@ -88,7 +88,7 @@ class LoopCloser:
             return []
         with self._stopwatch.measure("candidates"):
             farthest = rules.radius + 2.0 * self._widest.half_x
-            near, distances = graph.near.of(newest, newest - rules.min_gap, farthest, NEAREST)
+            near, distances = graph.near.of(graph.poses[newest], newest - rules.min_gap, farthest, NEAREST)
             # Those within the radius are candidates however well they are known; mostly there are enough of them.
             inside = distances <= rules.radius
             targets = self._apart(near[inside])

@@ -9,55 +9,66 @@ from numpy.typing import NDArray
 
 from hsslam.jit import kernel
 from hsslam.se2 import Pose, Poses
+from hsslam.slam.scan_table import Rows
 
 CELL = 0.5
 """Side of a cell (m)."""
+
+HEADINGS = 8
+ENOUGH = 10
+"""Keyframes of a cell that look about the same way, one of so many; those that come later are not remembered.
+
+A robot that drives the same rounds for weeks sees no more of a place from its thousandth keyframe there. The
+oldest are kept: the map has settled around them.
+"""
 
 _BUCKETS = 1 << 14
 _ROOM = 1024
 
 
 class NearIndex:
-    """Keyframes by where they are."""
+    """Keyframes by where they are; of a place that was visited often, the first so many."""
 
     def __init__(self) -> None:
         self._heads = np.full(_BUCKETS, -1, dtype=np.int64)
-        self._next = np.empty(_ROOM, dtype=np.int64)
-        self._poses = np.empty((_ROOM, 3))
-        self._count = 0
+        self._next, self._numbers, self._poses = Rows(dtype=np.int64), Rows(dtype=np.int64), Rows(3)
+        self._seen = 0
+
+    def __len__(self) -> int:
+        return len(self._numbers)
 
     def add(self, pose: Pose) -> None:
-        """Add the next keyframe."""
-        if self._count == len(self._poses):
-            self._next = np.concatenate((self._next, np.empty_like(self._next)))
-            self._poses = np.concatenate((self._poses, np.empty_like(self._poses)))
-        self._poses[self._count] = pose
-        insert(self._heads, self._next, self._poses, self._count, self._count + 1)
-        self._count += 1
+        """Add the next keyframe, unless there are enough like it."""
+        poses = self._poses.values
+        if alike(self._heads, self._next.values, poses, pose) < ENOUGH:
+            self._numbers.append(self._seen)
+            self._poses.append(pose)
+            self._next.append(-1)
+            insert(self._heads, self._next.values, self._poses.values, len(poses))
+        self._seen += 1
 
     def rebuild(self, poses: Poses) -> None:
         """Take note of where all keyframes (K, 3) are now."""
-        self._poses[: self._count] = poses
+        self._poses.values[:] = poses[self._numbers.values]
         self._heads.fill(-1)
-        insert(self._heads, self._next, self._poses, 0, self._count)
+        insert(self._heads, self._next.values, self._poses.values, 0)
 
     def of(
-        self, keyframe: int, stop: int, radius: float, most: int
+        self, pose: Pose, stop: int, radius: float, most: int
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Keyframes 0 to ``stop - 1`` within ``radius`` (m) of one, the ``most`` nearest, nearest first.
+        """Keyframes with numbers below ``stop`` within ``radius`` (m) of a pose, the ``most`` nearest, nearest first.
 
         Returns
         -------
         (int64 (N,), float64 (N,))
             Their numbers and distances (m); of two at the same distance the earlier comes first.
         """
-        x, y, _ = self._poses[keyframe]
-        found = around(self._heads, self._next, self._poses, x, y, stop, radius, most)
-        offsets = self._poses[found, :2] - self._poses[keyframe, :2]
-        distances = np.hypot(offsets[:, 0], offsets[:, 1])
+        poses, below = self._poses.values, int(np.searchsorted(self._numbers.values, stop))
+        found = around(self._heads, self._next.values, poses, pose, below, radius, most)
+        distances = np.hypot(poses[found, 0] - pose[0], poses[found, 1] - pose[1])
         order = np.lexsort((found, distances))[:most]
         order = order[distances[order] <= radius]
-        return found[order], distances[order]
+        return self._numbers.values[found[order]], distances[order]
 
 
 @kernel
@@ -66,14 +77,35 @@ def _bucket(column: int, row: int, buckets: int) -> int:
 
 
 @kernel
-def insert(
-    heads: NDArray[np.int64], following: NDArray[np.int64], poses: Poses, first: int, stop: int
-) -> None:
-    """Put keyframes ``first`` to ``stop - 1`` at the heads of the lists of their cells."""
-    for k in range(first, stop):
+def _heading(theta: float) -> int:
+    return int(math.floor((theta + math.pi) / (2.0 * math.pi) * HEADINGS))
+
+
+@kernel
+def _in_cell(pose: Pose, column: int, row: int) -> bool:
+    return bool(math.floor(pose[0] / CELL) == column and math.floor(pose[1] / CELL) == row)
+
+
+@kernel
+def insert(heads: NDArray[np.int64], following: NDArray[np.int64], poses: Poses, first: int) -> None:
+    """Put keyframes from ``first`` on at the heads of the lists of their cells."""
+    for k in range(first, len(poses)):
         bucket = _bucket(math.floor(poses[k, 0] / CELL), math.floor(poses[k, 1] / CELL), len(heads))
         following[k] = heads[bucket]
         heads[bucket] = k
+
+
+@kernel
+def alike(heads: NDArray[np.int64], following: NDArray[np.int64], poses: Poses, pose: Pose) -> int:
+    """How many keyframes are in the cell of a pose and look about the same way."""
+    column, row = math.floor(pose[0] / CELL), math.floor(pose[1] / CELL)
+    count = 0
+    k = heads[_bucket(column, row, len(heads))]
+    while k >= 0:
+        if _in_cell(poses[k], column, row) and _heading(poses[k, 2]) == _heading(pose[2]):
+            count += 1
+        k = following[k]
+    return count
 
 
 @kernel
@@ -81,28 +113,22 @@ def around(
     heads: NDArray[np.int64],
     following: NDArray[np.int64],
     poses: Poses,
-    x: float,
-    y: float,
+    pose: Pose,
     stop: int,
     radius: float,
     most: int,
 ) -> NDArray[np.int64]:
-    """Numbers below ``stop`` of the keyframes in rings of cells, until ``most`` are nearer than what was not seen."""
+    """Rows below ``stop`` of the keyframes in rings of cells, until ``most`` are nearer than what was not seen."""
     found = np.empty(4 * most, dtype=np.int64)
     count = 0
-    column0, row0 = math.floor(x / CELL), math.floor(y / CELL)
+    column0, row0 = math.floor(pose[0] / CELL), math.floor(pose[1] / CELL)
     for ring in range(math.ceil(radius / CELL) + 1):
         for column in range(column0 - ring, column0 + ring + 1):
-            edge = abs(column - column0) == ring
-            for row in range(row0 - ring, row0 + ring + 1, 1 if edge else max(2 * ring, 1)):
+            step = 1 if abs(column - column0) == ring else 2 * ring
+            for row in range(row0 - ring, row0 + ring + 1, step):
                 k = heads[_bucket(column, row, len(heads))]
                 while k >= 0:
-                    here = (
-                        k < stop
-                        and math.floor(poses[k, 0] / CELL) == column
-                        and math.floor(poses[k, 1] / CELL) == row
-                    )
-                    if here:
+                    if k < stop and _in_cell(poses[k], column, row):
                         if count == len(found):
                             found = np.concatenate((found, np.empty_like(found)))
                         found[count] = k
@@ -110,7 +136,8 @@ def around(
                     k = following[k]
         nearer = 0
         for i in range(count):
-            if math.hypot(poses[found[i], 0] - x, poses[found[i], 1] - y) < ring * CELL:
+            k = found[i]
+            if math.hypot(poses[k, 0] - pose[0], poses[k, 1] - pose[1]) < ring * CELL:
                 nearer += 1
         if nearer >= most:
             break

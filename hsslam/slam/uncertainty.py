@@ -11,6 +11,13 @@ from numpy.typing import NDArray
 from hsslam.jit import kernel
 from hsslam.se2 import Poses
 
+MOST_LINKS = 12
+"""Links of a keyframe; once it has so many, paths lead from it to no later keyframe but the next.
+
+Where a robot comes by every day, an old keyframe is tied to ever more new ones, and each path through it would look at
+all. To leave some out can only make what is known seem less known.
+"""
+
 _ROOM = 4096
 
 _Number = TypeVar("_Number", np.int64, np.float64)
@@ -29,6 +36,7 @@ class RelativeUncertainty:
         self._first_link = np.full(_ROOM, -1, dtype=np.int64)
         self._links = np.empty((_ROOM, 2), dtype=np.int64)
         self._variances = np.empty((_ROOM, 2))
+        self._degrees = np.zeros(_ROOM, dtype=np.int64)
         self._count = 0
         self._search = _Scratch(_ROOM)
 
@@ -37,7 +45,11 @@ class RelativeUncertainty:
         self._first_link = _with_room(self._first_link, max(first, second) + 1, -1)
         self._links = _with_room(self._links, self._count + 2, -1)
         self._variances = _with_room(self._variances, self._count + 2, 0)
+        self._degrees = _with_room(self._degrees, max(first, second) + 1, 0)
         for here, there in ((first, second), (second, first)):
+            if here < there - 1 and self._degrees[here] >= MOST_LINKS:
+                continue
+            self._degrees[here] += 1
             self._links[self._count] = there, self._first_link[here]
             self._variances[self._count] = variance_xy, variance_theta
             self._first_link[here] = self._count
