@@ -42,8 +42,10 @@ def grid_twin(scans: list[LaserScan], poses: NDArray[np.float64], grid: Occupanc
     """Log odds by the model in words: a return adds HIT, the cells before it MISS unless a return is in them."""
     out = np.zeros(grid.shape)
 
+    first = np.round(grid.origin / grid.resolution)
+
     def cell(place: NDArray[np.float64]) -> tuple[int, int]:
-        x, y = np.floor((place - grid.origin) / grid.resolution).astype(int)
+        x, y = (np.floor(place / grid.resolution) - first).astype(int)
         return int(x), int(y)
 
     for scan, robot in zip(scans, poses, strict=True):

@@ -25,8 +25,7 @@ def _reach(
 
 
 @kernel
-def widen(
-    bounds: NDArray[np.float64],
+def reach_of(
     ranges: NDArray[np.float64],
     poses: Poses,
     cosine: NDArray[np.float64],
@@ -35,27 +34,34 @@ def widen(
     range_max: float,
     max_range: float,
     no_return_range: float,
-) -> None:
-    """Stretch ``bounds`` (x_min, y_min, x_max, y_max) over the laser poses and all that their beams reach."""
+) -> NDArray[np.float64]:
+    """What each scan touches, (N, 5): x_min, y_min, x_max, y_max of laser and beams, and the longest beam (m)."""
+    out = np.empty((ranges.shape[0], 5))
     for i in range(ranges.shape[0]):
         c, s = math.cos(poses[i, 2]), math.sin(poses[i, 2])
-        bounds[0], bounds[1] = min(bounds[0], poses[i, 0]), min(bounds[1], poses[i, 1])
-        bounds[2], bounds[3] = max(bounds[2], poses[i, 0]), max(bounds[3], poses[i, 1])
+        out[i, 0], out[i, 1] = poses[i, 0], poses[i, 1]
+        out[i, 2], out[i, 3] = poses[i, 0], poses[i, 1]
+        out[i, 4] = 0.0
         for k in range(ranges.shape[1]):
             reach, _ = _reach(ranges[i, k], range_min, range_max, max_range, no_return_range)
             x = poses[i, 0] + reach * (c * cosine[k] - s * sine[k])
             y = poses[i, 1] + reach * (s * cosine[k] + c * sine[k])
-            bounds[0], bounds[1] = min(bounds[0], x), min(bounds[1], y)
-            bounds[2], bounds[3] = max(bounds[2], x), max(bounds[3], y)
+            out[i, 0], out[i, 1] = min(out[i, 0], x), min(out[i, 1], y)
+            out[i, 2], out[i, 3] = max(out[i, 2], x), max(out[i, 3], y)
+            out[i, 4] = max(out[i, 4], reach)
+    return out
 
 
 @kernel
-def mark(
-    log_odds: NDArray[np.float32],
+def count(
+    hits: NDArray[np.int32],
+    misses: NDArray[np.int32],
     last_hit: NDArray[np.int32],
-    origin: NDArray[np.float64],
+    low_column: int,
+    low_row: int,
     resolution: float,
-    first: int,
+    number: int,
+    sign: int,
     ranges: NDArray[np.float64],
     poses: Poses,
     cosine: NDArray[np.float64],
@@ -64,30 +70,28 @@ def mark(
     range_max: float,
     max_range: float,
     no_return_range: float,
-    hit: float,
-    miss: float,
 ) -> None:
-    """Add what scans tell to ``log_odds``.
+    """Add ``sign`` to the ``hits`` of each cell that holds a return, and to the ``misses`` of those on the way to it.
 
-    ``last_hit`` holds, for each cell, the number of the last scan with a return in it; ``first`` is the number
-    of the first scan of this block.
+    Cells are numbered from that whose corner is the origin of the world; the arrays begin at ``low_column`` and
+    ``low_row``. ``last_hit`` holds, for each cell, the number of the last scan with a return in it; ``number``
+    is that of the first scan of this block.
     """
     beams = ranges.shape[1]
     columns, rows = np.empty(beams, np.int64), np.empty(beams, np.int64)
     for i in range(ranges.shape[0]):
-        number = first + i
         c, s = math.cos(poses[i, 2]), math.sin(poses[i, 2])
-        column0 = math.floor((poses[i, 0] - origin[0]) / resolution)
-        row0 = math.floor((poses[i, 1] - origin[1]) / resolution)
+        column0 = math.floor(poses[i, 0] / resolution) - low_column
+        row0 = math.floor(poses[i, 1] / resolution) - low_row
         for k in range(beams):
             reach, occupied = _reach(ranges[i, k], range_min, range_max, max_range, no_return_range)
             x = poses[i, 0] + reach * (c * cosine[k] - s * sine[k])
             y = poses[i, 1] + reach * (s * cosine[k] + c * sine[k])
-            columns[k] = math.floor((x - origin[0]) / resolution)
-            rows[k] = math.floor((y - origin[1]) / resolution)
+            columns[k] = math.floor(x / resolution) - low_column
+            rows[k] = math.floor(y / resolution) - low_row
             if occupied:
-                log_odds[rows[k], columns[k]] += hit
-                last_hit[rows[k], columns[k]] = number
+                hits[rows[k], columns[k]] += sign
+                last_hit[rows[k], columns[k]] = number + i
         for k in range(beams):
             # Bresenham's line from the laser's cell up to, and without, the last one.
             column, row = column0, row0
@@ -96,8 +100,8 @@ def mark(
             row_step = 1 if rows[k] > row0 else -1
             error = across - up
             while column != columns[k] or row != rows[k]:
-                if last_hit[row, column] != number:
-                    log_odds[row, column] += miss
+                if last_hit[row, column] != number + i:
+                    misses[row, column] += sign
                 twice = 2 * error
                 if twice > -up:
                     error -= up

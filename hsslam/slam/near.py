@@ -78,7 +78,7 @@ def _bucket(column: int, row: int, buckets: int) -> int:
 
 @kernel
 def _heading(theta: float) -> int:
-    return int(math.floor((theta + math.pi) / (2.0 * math.pi) * HEADINGS))
+    return math.floor((theta + math.pi) / (2.0 * math.pi) * HEADINGS)
 
 
 @kernel

@@ -9,7 +9,7 @@ import numpy as np
 from hsslam.config import Config
 from hsslam.errors import DataError
 from hsslam.scan import LaserScan
-from hsslam.se2 import Points, between_many, compose, compose_many
+from hsslam.se2 import Points, Poses, between_many, compose, compose_many
 from hsslam.slam.events import (
     Edge,
     Event,
@@ -172,6 +172,11 @@ class Slam:
             statistics={"evaluations": self._evaluations},
             covariances=graph.marginal_covariances() if self._config.graph.marginals else None,
         )
+
+    @property
+    def keyframe_poses(self) -> Poses:
+        """(K, 3) where the keyframes are, as far as is known by now; none before the first scan."""
+        return self._graph.poses.copy() if self._graph is not None else np.zeros((0, 3))
 
     def _close_loops(self) -> Iterator[Event]:
         graph = self._require_graph()
