@@ -26,7 +26,7 @@ from hsslam.config import Config, load_config
 from hsslam.datasets.simulator import SimulatedDataset
 from hsslam.slam.events import KeyframeAdded, LoopChecked
 from hsslam.slam.pipeline import Slam
-from hsslam.slam.tracker import search_window
+from hsslam.slam.windows import search_window
 
 
 @dataclass(frozen=True)
