@@ -16,7 +16,7 @@ from hsslam.slam.recovery import best_elsewhere, match_tiles
 
 WIDE = SearchWindow(1.2, 0.4, math.radians(10.0))
 TILE = SearchWindow(0.3, 0.2, math.radians(10.0))
-APART = (0.5, math.radians(15.0))
+APART = SearchWindow(0.5, 0.5, math.radians(15.0))
 
 
 def niches(count: int, spacing: float) -> NDArray[np.float64]:
@@ -54,7 +54,7 @@ def test_the_answer_itself_is_no_other_one() -> None:
         np.zeros(3),
         TILE,
         TILE,
-        (5.0, math.pi),
+        SearchWindow(5.0, 5.0, math.pi),
         np.random.default_rng(1),
     )
     assert score == 0.0

@@ -11,7 +11,7 @@ from hsslam.config import LoopSection
 from hsslam.se2 import Poses, between, compose, pose
 from hsslam.slam.events import LoopChecked
 from hsslam.slam.fusion import GATE
-from hsslam.slam.verification import COMPARABLE_GAP, LoopVerifier, agree
+from hsslam.slam.verification import COMPARABLE_GAP, OUTVOTED, LoopVerifier, agree
 
 RULES = LoopSection()
 TRUTH: Poses = np.array([pose(0.3 * i, 0.1 * (i % 7), 0.05 * (i % 5)) for i in range(300)])
@@ -29,7 +29,7 @@ def loop(first: int, second: int, **told: object) -> LoopChecked:
         "covariance": 1e-4 * np.eye(3),
         "score": 0.9,
         "evaluations": 1,
-        "expected_std": 1.0,
+        "expected_std": 0.3,
         "surprise": 100.0,
         **told,
     }
@@ -115,6 +115,40 @@ def test_an_ambiguous_loop_is_refused_with_its_companions() -> None:
     found = judge.close()
     assert not any(f.accepted for f in found)
     assert found[-1].reason.startswith("ambiguous: another pose scores 1.14")
+
+
+@pytest.mark.parametrize(("expected_std", "enough"), [(0.33, 3), (0.66, 5), (2.64, 9)])
+def test_the_wider_the_search_the_more_loops_must_agree(expected_std: float, enough: int) -> None:
+    judge = verifier()
+    told = [judge.judge(loop(10 + k, 200 + k, expected_std=expected_std), ESTIMATE) for k in range(enough)]
+    assert [len(found) for found in told] == [0] * (enough - 1) + [enough]
+
+
+def test_a_refused_far_loop_says_how_many_would_have_been_enough() -> None:
+    judge = verifier()
+    judge.judge(loop(10, 200, expected_std=1.32), ESTIMATE)
+    (found,) = judge.close()
+    assert found.reason == "0 other loops agree with it, not 6"
+
+
+def test_many_loops_outvote_an_ambiguity() -> None:
+    """Along a corridor any shift explains most points; a dozen keyframes that all say the same are not chance."""
+    judge = verifier(lambda _: 1.0)
+    enough = 1 + OUTVOTED * RULES.agreeing
+    told = [judge.judge(loop(10 + k, 200 + k), ESTIMATE) for k in range(enough)]
+    assert not any(told[:-1])
+    assert len(told[-1]) == enough
+
+
+def test_loops_that_more_others_contradict_wait() -> None:
+    judge = verifier(lambda asked_for: 1.0 if asked_for.second < 206 else 0.0)
+    for k in range(6):
+        assert judge.judge(loop(10 + k, 200 + k), ESTIMATE) == []  # ambiguous, but there are six of them
+    for k in range(6, 9):
+        shifted = between(TRUTH[10 + k], compose(pose(2.8, 0.0, 0.0), TRUTH[200 + k]))
+        assert judge.judge(loop(10 + k, 200 + k, relative=shifted), ESTIMATE) == []
+    reasons = {found.second: found.reason for found in judge.close()}
+    assert reasons[208] == "2 other loops agree with it, but as many with one that contradicts it"
 
 
 def test_waiting_ends_after_patience_with_a_reason() -> None:

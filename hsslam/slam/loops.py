@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from hsslam.config import Config
 from hsslam.matching.interface import Matcher, Reference, SearchWindow
 from hsslam.se2 import Points, Pose, Poses, between, compose, inverse, wrap
 from hsslam.slam.events import LoopChecked
+from hsslam.slam.far import NEAR, FarSearch
 from hsslam.slam.fusion import rotated, squared_mahalanobis
 from hsslam.slam.graph import PoseGraph
 from hsslam.slam.randomness import Purpose, generator
@@ -31,9 +33,8 @@ NEAREST = 200
 LEAST = SearchWindow(0.15, 0.15, math.radians(5.0))
 """No window is smaller than this: it costs a search little, and covariances may be too small."""
 
-ELSEWHERE_XY = 0.5
-ELSEWHERE_THETA = math.radians(15.0)
-"""An answer this far from the one in question (m, rad) is another one."""
+ELSEWHERE = SearchWindow(0.5, 0.5, math.radians(15.0))
+"""An answer outside of this around the one in question is another one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +59,11 @@ class _Place:
         """A keyframe of the submap in the reference's frame."""
         return between(self.origin, self.poses[keyframe - self.first])
 
+    @cached_property
+    def far(self) -> FarSearch:
+        """For windows wider than a matcher is asked to search."""
+        return FarSearch(self.reference.points)
+
 
 class LoopCloser:
     """Proposes and matches constraints between the newest keyframe and earlier ones.
@@ -77,6 +83,7 @@ class LoopCloser:
         self._matcher = matcher
         self._stopwatch = stopwatch
         self._widest = search_window(config.loops.window)
+        self._farthest = search_window(config.loops.far_window)
         self._tile = search_window(config.tracker.window)
         self._places: dict[int, _Place] = {}
 
@@ -87,7 +94,7 @@ class LoopCloser:
         if not rules.enabled or newest % rules.every or newest <= rules.min_gap:
             return []
         with self._stopwatch.measure("candidates"):
-            farthest = rules.radius + 2.0 * self._widest.half_x
+            farthest = rules.radius + 2.0 * self._farthest.half_x
             near, distances = graph.near.of(graph.poses[newest], newest - rules.min_gap, farthest, NEAREST)
             # Those within the radius are candidates however well they are known; mostly there are enough of them.
             inside = distances <= rules.radius
@@ -100,7 +107,7 @@ class LoopCloser:
         reachable = [
             first
             for first, (xy, _) in known.items()
-            if reach[first] <= rules.radius + 2.0 * min(math.sqrt(xy), self._widest.half_x)
+            if reach[first] <= rules.radius + 2.0 * min(math.sqrt(xy), self._farthest.half_x)
         ]
         return [Candidate(first, *known[first]) for first in self._apart(np.array(reachable)).tolist()]
 
@@ -152,21 +159,22 @@ class LoopCloser:
         self._places.clear()
 
     def ambiguity(self, loop: LoopChecked, points: Sequence[Points], poses: Poses) -> float:
-        """Score of the best answer elsewhere in the widest window, over that of the loop's own answer."""
+        """Score of the best answer elsewhere in the window of the search, over that of the loop's own answer."""
         with self._stopwatch.measure("ambiguity"):
             place = self._place(loop.first, points, poses)
             answer = compose(place.of(loop.first), loop.relative)
+            scan = points[loop.second]
             rng = generator(self._config.seed, Purpose.AMBIGUITY, loop.first, loop.second)
-            score = best_elsewhere(
-                self._matcher,
-                place.reference,
-                points[loop.second],
-                answer,
-                self._widest,
-                self._tile,
-                (ELSEWHERE_XY, ELSEWHERE_THETA),
-                rng,
-            )
+            window = foreseen_window(loop.expected_std**2, 0.0, self._widest, self._farthest)
+            if window == self._widest:
+                score = best_elsewhere(
+                    self._matcher, place.reference, scan, answer, window, self._tile, ELSEWHERE, rng
+                )
+            else:
+                score = max(
+                    self._matcher.match(place.reference, scan, pose, NEAR, rng).score
+                    for pose in place.far.elsewhere(scan, answer, window, ELSEWHERE)
+                )
         return score / max(loop.score, 1e-9)
 
     def _match(
@@ -175,10 +183,11 @@ class LoopCloser:
         first = candidate.first
         base = place.of(first)
         rng = generator(self._config.seed, Purpose.LOOP, first, second)
-        window = foreseen_window(candidate.variance_xy, candidate.variance_theta, LEAST, self._widest)
-        result = match_within(
-            self._matcher, place.reference, scan, compose(base, guess), window, self._tile, rng
-        )
+        expected = compose(base, guess)
+        window = foreseen_window(candidate.variance_xy, candidate.variance_theta, LEAST, self._farthest)
+        if (window.half > self._widest.half).any():
+            expected, window = place.far.best(scan, expected, window), NEAR
+        result = match_within(self._matcher, place.reference, scan, expected, window, self._tile, rng)
         return LoopChecked(
             first=first,
             second=second,

@@ -70,7 +70,7 @@ def best_elsewhere(
     answer: Pose,
     wide: SearchWindow,
     tile: SearchWindow,
-    apart: tuple[float, float],
+    apart: SearchWindow,
     rng: np.random.Generator,
 ) -> float:
     """Score of the best match that is not the answer in question.
@@ -83,21 +83,21 @@ def best_elsewhere(
         In the reference's frame.
     wide, tile : SearchWindow
         What is searched around the answer, and the part searched at a time.
-    apart : (float, float)
-        Distance (m) and turn (rad) at which a match is another answer.
+    apart : SearchWindow
+        A match outside of it is another answer; its ``half_x`` is the distance in any direction.
     """
     best = 0.0
     steps = (steps_along(w, t) for w, t in zip(wide.half, tile.half, strict=True))
     for offset in product(*steps):
         # A tile whose every place is near the answer can tell nothing else.
         if (
-            np.hypot(offset[0], offset[1]) + tile.half_x < apart[0]
-            and abs(offset[2]) + tile.half_theta < apart[1]
+            np.hypot(offset[0], offset[1]) + tile.half_x < apart.half_x
+            and abs(offset[2]) + tile.half_theta < apart.half_theta
         ):
             continue
         result = matcher.match(reference, points, answer + np.array(offset), tile, rng)
         away = result.pose - answer
-        far = np.hypot(away[0], away[1]) >= apart[0] or abs(wrap(away[2])) >= apart[1]
+        far = np.hypot(away[0], away[1]) >= apart.half_x or abs(wrap(away[2])) >= apart.half_theta
         if result.converged and far:
             best = max(best, result.score)
     return best

@@ -22,6 +22,20 @@ AGREEMENT_THETA = math.radians(2.0)
 """Two loops agree when going round both of them ends this near to the start (m, m per metre of way, rad)."""
 
 
+WELL_KNOWN = 0.33
+"""A standard deviation (m) up to which the usual number of loops must agree; each doubling takes as many more.
+
+A window as wide as the graph is unsure holds the more places that look like the one sought, the wider it is.
+"""
+
+OUTVOTED = 5
+"""This many times the loops that must agree outvote an ambiguity.
+
+Along a corridor every shift explains nearly all points, and only the niches tell which is right. Were that chance,
+the loops would not all say the same.
+"""
+
+
 class LoopVerifier:
     """Judges matched loops; some at once, others when more is known.
 
@@ -57,12 +71,12 @@ class LoopVerifier:
         companions = [other for other in self._pending if agree(loop, other, poses)]
         believed = [other for other in self._believed if agree(loop, other, poses)]
         loop = replace(loop, agreeing=len(companions) + len(believed))
-        if loop.agreeing < rules.agreeing:
+        if loop.agreeing < self._needed(loop) or loop.agreeing <= self._contradicted(loop, poses):
             self._pending.append(loop)
             return []
         if loop.expected_std > rules.expected_std:  # else the window was too small to hold another answer
             loop = replace(loop, ambiguity=self._ambiguity(loop))
-        if loop.ambiguity > rules.max_ambiguity:
+        if loop.ambiguity > rules.max_ambiguity and loop.agreeing < OUTVOTED * rules.agreeing:
             self._pending.append(loop)
             return []
         self._pending = [other for other in self._pending if other not in companions]
@@ -84,6 +98,22 @@ class LoopVerifier:
         over, self._pending = self._pending, []
         return [replace(loop, accepted=False, reason=self._refusal(loop)) for loop in over]
 
+    def _needed(self, loop: LoopChecked) -> int:
+        """How many others must agree with a loop."""
+        doublings = math.log2(max(loop.expected_std / WELL_KNOWN, 1.0))
+        return round(self._rules.agreeing * (1.0 + doublings))
+
+    def _contradicted(self, loop: LoopChecked, poses: Poses) -> int:
+        """How many agree, at most, with a loop that waits and contradicts this one; -1 if none does."""
+        return max(
+            (
+                other.agreeing
+                for other in self._pending
+                if comparable(loop, other) and not agree(loop, other, poses)
+            ),
+            default=-1,
+        )
+
     def _believe(self, loop: LoopChecked) -> LoopChecked:
         loop = replace(loop, accepted=True)
         self._believed.append(loop)
@@ -93,14 +123,20 @@ class LoopVerifier:
         rules = self._rules
         if loop.ambiguity > rules.max_ambiguity:
             return f"ambiguous: another pose scores {loop.ambiguity:.2f} of its score"
-        return f"{loop.agreeing} other loops agree with it, not {rules.agreeing}"
+        if loop.agreeing < self._needed(loop):
+            return f"{loop.agreeing} other loops agree with it, not {self._needed(loop)}"
+        return f"{loop.agreeing} other loops agree with it, but as many with one that contradicts it"
+
+
+def comparable(a: LoopChecked, b: LoopChecked) -> bool:
+    """Whether two loops are of different keyframes, and so near in time that the graph can tell whether they agree."""
+    gap = max(abs(a.second - b.second), abs(a.first - b.first))
+    return a.second != b.second and gap <= COMPARABLE_GAP
 
 
 def agree(a: LoopChecked, b: LoopChecked, poses: Poses) -> bool:
-    """Whether two loops of different keyframes that are near in time say the same of the robot's whereabouts."""
-    if a.second == b.second:
-        return False
-    if abs(a.second - b.second) > COMPARABLE_GAP or abs(a.first - b.first) > COMPARABLE_GAP:
+    """Whether two comparable loops say the same of the robot's whereabouts."""
+    if not comparable(a, b):
         return False
     there = compose(a.relative, between(poses[a.second], poses[b.second]))
     here = compose(between(poses[a.first], poses[b.first]), b.relative)

@@ -1,0 +1,75 @@
+"""Places that are metres away from where they are thought to be."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from conftest import room_scan_at
+
+from hsslam.config import load_config
+from hsslam.datasets.simulator import SimulatedDataset
+from hsslam.matching import create
+from hsslam.matching.interface import SearchWindow
+from hsslam.se2 import Points, Poses, between, compose, pose, wrap
+from hsslam.slam.far import CELL, FarSearch
+from hsslam.slam.loops import Candidate, LoopCloser
+from hsslam.slam.stopwatch import Stopwatch
+
+WIDE = SearchWindow(6.0, 6.0, math.radians(30.0))
+PLACE = room_scan_at(np.zeros(3)).points
+
+
+@pytest.mark.parametrize("guess", [pose(4.5, -3.0, 0.3), pose(-2.0, 5.0, -0.4), pose(0.0, 0.0, 0.0)])
+def test_a_place_is_found_from_metres_away(guess: np.ndarray) -> None:
+    truth = pose(0.4, -0.3, 0.1)
+    found = FarSearch(PLACE).best(room_scan_at(truth, noise=0.01).points, compose(guess, truth), WIDE)
+    assert np.abs(found[:2] - truth[:2]).max() < 2.0 * CELL
+    assert abs(wrap(found[2] - truth[2])) < math.radians(2.0)
+
+
+def test_without_points_the_guess_is_all_there_is() -> None:
+    nothing, guess = np.empty((0, 2)), pose(1.0, 2.0, 0.3)
+    assert (FarSearch(PLACE).best(nothing, guess, WIDE) == guess).all()
+    assert (FarSearch(nothing).best(PLACE, guess, WIDE) == guess).all()
+
+
+def test_other_answers_are_looked_for_on_every_side_and_outside_of_what_is_near() -> None:
+    answer, near = pose(0.1, 0.2, 0.05), SearchWindow(0.5, 0.5, math.radians(15.0))
+    found = FarSearch(PLACE).elsewhere(PLACE, answer, WIDE, near)
+    assert len(found) == 6
+    for other in found:
+        off = np.abs(other - answer)
+        assert (off >= near.half - 1e-6).any()
+        assert (off <= WIDE.half + 1e-6).all()
+
+
+def test_a_window_that_reaches_no_further_holds_no_other_answer() -> None:
+    near = SearchWindow(0.5, 0.5, math.radians(15.0))
+    assert FarSearch(PLACE).elsewhere(PLACE, np.zeros(3), near, near) == []
+
+
+DRIFT = pose(4.2, -3.1, 0.15)
+
+
+@pytest.fixture(scope="module")
+def round_trip() -> tuple[Poses, list[Points]]:
+    """True poses and points of keyframes along the office's corridor, and of one more, back among the first ones."""
+    log = SimulatedDataset("office", scans=121, seed=3)
+    scans = list(log.scans())
+    numbers = [*range(0, 121, 4), 22]
+    return log.poses[numbers], [scans[i].robot_points for i in numbers]
+
+
+@pytest.mark.parametrize("name", ["hide", "pl_icp"])
+def test_a_loop_is_found_after_a_drift_of_metres(name: str, round_trip: tuple[Poses, list[Points]]) -> None:
+    truth, points = round_trip
+    estimate = truth.copy()
+    estimate[-1] = compose(DRIFT, truth[-1])
+    closer = LoopCloser(load_config(overrides=[f"matcher={name}"]), create(name), Stopwatch())
+    candidate = Candidate(first=5, variance_xy=2.0**2, variance_theta=math.radians(5.0) ** 2)
+    loop = closer.match(candidate, points, estimate)
+    assert loop.reason == ""
+    assert loop.relative == pytest.approx(between(truth[5], truth[-1]), abs=0.03)
+    assert closer.ambiguity(loop, points, estimate) > 0.9  # a corridor explains itself a few steps on, too
