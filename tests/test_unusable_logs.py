@@ -33,7 +33,7 @@ def raw(content: bytes) -> Callable[[Path], None]:
         ("log.npz", ranges(np.nan), "181 are not finite"),
         ("log.npz", ranges(0.0), "181 are zero or negative"),
         ("log.npz", ranges(3000.0), "are they millimetres?"),
-        ("log.npz", ranges(3.0, beams=2), "too few are there"),
+        ("log.npz", ranges(3.0, beams=2), "log.npz: expected scans with 3 returns or more, found none in 5; the first"),
         ("log.npz", ranges(3.0, angle_min=-90.0, angle_increment=1.0), "turns; expected radians: are these deg"),
         ("log.clf", raw(b"\x89PNG\r\n\x1a\n\x00\x00\rIHDR\x1e{\xef\n"), "expected a CARMEN log, a text file, found a"),
         ("log.clf", raw(b"# only\n# remarks\n"), "messages, found no messages"),

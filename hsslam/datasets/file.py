@@ -60,7 +60,7 @@ class FileDataset:
         self._limit = scans
         self._options = options or LogOptions()
         if (self._options.scan_topic or self._options.odom_topic) and found.name not in BAGS:
-            raise DataError(f"{self.path}: a {title} has no topics; leave out scan_topic and odom_topic")
+            raise DataError(f"{self.path}: a {title} has no topics; leave out --scan-topic and --odom-topic")
         self._count = info.scan_count if info is not None else None
         if scans is not None and self._count is not None:
             self._count = min(scans, self._count)

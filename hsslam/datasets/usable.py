@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hsslam.datasets.dataset import Dataset
+from hsslam.datasets.file import FileDataset
 from hsslam.errors import DataError
 from hsslam.scan import LaserScan
 
@@ -28,8 +29,9 @@ def require_returns(log: Dataset) -> None:
         first = scan if first is None else first
         count += 1
     if first is not None:
+        name = log.path if isinstance(log, FileDataset) else log.info.name
         raise DataError(
-            f"{log.info.name}: expected scans with {ENOUGH} returns or more, found none in {count:,}; "
+            f"{name}: expected scans with {ENOUGH} returns or more, found none in {count:,}; "
             f"{_readings(first)}"
         )
 
@@ -38,7 +40,6 @@ def _readings(scan: LaserScan) -> str:
     """What the readings of a scan are that are no returns, and what may be wrong."""
     ranges, geometry = scan.ranges, scan.geometry
     finite = ranges[np.isfinite(ranges)]
-    told = [f"of the {len(ranges)} readings of the first"]
     counts = (
         (len(ranges) - len(finite), "are not finite"),
         (
@@ -51,8 +52,10 @@ def _readings(scan: LaserScan) -> str:
             f"are below range_min, {geometry.range_min:g} m",
         ),
     )
-    told.append(", ".join(f"{number} {what}" for number, what in counts if number) or "too few are there")
-    text = " ".join(told)
+    told = ", ".join(f"{number} {what}" for number, what in counts if number)
+    if not told:
+        return f"the first has {len(ranges)} readings in all"
+    text = f"of the {len(ranges)} readings of the first {told}"
     if len(finite) and np.median(finite) > 10.0 * geometry.range_max:
         text += f" (their median is {np.median(finite):g}: are they millimetres? Expected are metres)"
     return text
