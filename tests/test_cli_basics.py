@@ -47,6 +47,16 @@ def test_help_lists_every_verb() -> None:
         assert f"\n  {verb} " in result.stdout
 
 
+@pytest.mark.parametrize("group", [(), ("config",), ("datasets",), ("matchers",), ("plugin",)])
+def test_no_verb_is_described_by_half_a_sentence(
+    group: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    shown = hsslam(*group, "--help").stdout
+    assert "Commands:" in shown
+    assert [line for line in shown.splitlines()[1:] if line.endswith("...")] == []
+
+
 def test_version() -> None:
     assert hsslam("--version").stdout.strip() == f"hsslam {__version__}"
 

@@ -27,7 +27,10 @@ def show(
     seed: Seed = None,
     settings: Settings = None,
 ) -> None:
-    """Print the resolved settings as YAML: every value a run would use, ready for --config."""
+    """Print every setting that a run would use, as YAML.
+
+    It is ready for --config.
+    """
     from hsslam.config import dump
 
     resolved = resolve(
@@ -43,7 +46,10 @@ def show(
 
 @app.command()
 def validate(file: Annotated[Path, typer.Argument(metavar="FILE", help="YAML settings.")]) -> None:
-    """Check a file of settings; says what is wrong and exits with 2 if anything is."""
+    """Check a file of settings.
+
+    Says what is wrong and where, and exits with 2 if anything is.
+    """
     resolve(file=file)
     console.say(f"{file}: valid")
 
@@ -55,7 +61,10 @@ def presets(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List the presets for sensors and places, or print one: what it overrides and why."""
+    """List the presets for sensors and places, or print one.
+
+    One is printed with what it overrides and why.
+    """
     from hsslam import presets as files
 
     if name is not None:
@@ -74,7 +83,10 @@ def presets(
 
 @app.command()
 def schema() -> None:
-    """Print the JSON schema of the settings, for editors; every matcher's parameters are in it."""
+    """Print the JSON schema of the settings, for editors.
+
+    Every matcher's parameters are in it.
+    """
     console.print_json(config_schema())
 
 

@@ -27,7 +27,7 @@ def default(context: typer.Context, plugin: Plugin = None) -> None:
 
 @app.command("list")
 def show(data_dir: DataDir = None, as_json: AsJson = False) -> None:
-    """List the datasets, and whether the real ones are on this machine."""
+    """List the datasets, and which are on this machine."""
     from hsslam.datasets import catalogue
 
     rows = []
@@ -55,7 +55,10 @@ def info(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Read a dataset through and say what is in it: scans, beams, duration, truth."""
+    """Read a dataset through and say what is in it.
+
+    Scans, beams, duration, truth.
+    """
     import numpy as np
 
     from hsslam.datasets.catalogue import join_source, open_dataset
@@ -144,7 +147,10 @@ def simulate(
     ] = "sick-lms200",
     quiet: Quiet = False,
 ) -> None:
-    """Write a simulated dataset as a CARMEN log, its exact poses beside it (FILE.truth.tum)."""
+    """Write a simulated dataset as a CARMEN log.
+
+    Its exact poses go beside it, as FILE.truth.tum.
+    """
     from hsslam.datasets.simulator import SimulatedDataset
     from hsslam.io.carmen import CarmenWriter
     from hsslam.io.tum import write_tum

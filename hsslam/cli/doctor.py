@@ -20,7 +20,7 @@ def doctor(
     plugin: Plugin = None,
     as_json: AsJson = False,
 ) -> None:
-    """Tell what is installed, what is missing, and the line that mends it.
+    """Tell what is installed, what is missing, what mends it.
 
     Exit code 0 where everything needed is there and works (optional parts may be missing), else 1.
     """

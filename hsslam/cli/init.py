@@ -20,7 +20,7 @@ def init(
     seed: Seed = None,
     settings: Settings = None,
 ) -> None:
-    """Write the default settings with a comment on each, to be edited.
+    """Write a file of all settings, each with a comment.
 
     A file that is there is never overwritten. `hsslam config presets` lists the presets.
     """

@@ -50,7 +50,10 @@ def describe(
     as_json: AsJson = False,
     plugin: Plugin = None,
 ) -> None:
-    """Print a matcher's parameters: name, type, default, range, meaning."""
+    """Print a matcher's parameters.
+
+    Name, type, default, range and meaning of each.
+    """
     from hsslam.matching import registry
 
     schema = registry.load(name).Config.model_json_schema()

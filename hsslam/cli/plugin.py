@@ -31,7 +31,10 @@ def new(
         Path | None, typer.Argument(metavar="[DIR]", help="A new folder; NAME if left out.")
     ] = None,
 ) -> None:
-    """Write a package with a matcher that works, its test, and the line that makes it known."""
+    """Write a package with a matcher that works, and its test.
+
+    Its pyproject.toml has the line that makes the matcher known once it is installed.
+    """
     from hsslam.scaffold import new_matcher
 
     place = folder if folder is not None else Path(name)
@@ -77,7 +80,7 @@ def check(
     seed: Seed = None,
     quiet: Quiet = False,
 ) -> None:
-    """Run the conformance suite on a matcher, then race it against the built-ins on the office.
+    """Check a matcher's promises, then race it on the office.
 
     Exit code 1 where it breaks a promise, or raises, crashes or hangs in the race.
     """
