@@ -11,7 +11,7 @@ from hsslam.se2 import Pose, Poses
 from hsslam.slam.events import Edge
 from hsslam.slam.factors import GraphError, between_factor, pose2, prior_factor, pull_factor
 
-ACTIVE = 1500
+ACTIVE = 500
 """Keyframes that a loop may move, at least; with twice as many the older half is frozen.
 
 iSAM2 touches every pose that it knows whenever it is asked, so what it knows must be bounded if the work per scan
