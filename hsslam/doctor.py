@@ -63,7 +63,7 @@ def examine(data_dir: Path | None = None) -> Iterator[Finding]:
     yield _sweeps()
     yield from _data(data_dir)
     yield _output()
-    yield Finding("display", "ok", "not needed: pictures and reports are drawn without one")
+    yield from _live()
 
 
 def _bags() -> Finding:
@@ -82,6 +82,20 @@ def _sweeps() -> Finding:
         return Finding("sweeps", "ok", f"run by distributed {metadata.version('distributed')}")
     except metadata.PackageNotFoundError:
         return Finding("sweeps", "missing", "distributed is not installed", "pip install 'hsslam[sweep]'")
+
+
+def _live() -> Iterator[Finding]:
+    """What can show a map while it grows; everything else is drawn without a display."""
+    from hsslam.live.viewers import INSTALL, display
+
+    try:
+        yield Finding("live map", "ok", f"shown by rerun-sdk {metadata.version('rerun-sdk')}, or matplotlib")
+    except metadata.PackageNotFoundError:
+        detail = "rerun-sdk is not installed; windows of matplotlib only"
+        yield Finding("live map", "missing", detail, INSTALL)
+    found = display()
+    detail = f"{found}, for --live" if found else "none, and none needed: --live does without, or records"
+    yield Finding("display", "ok", detail)
 
 
 def _python() -> Finding:

@@ -28,7 +28,8 @@ FORBIDDEN = {
     "hsslam.datasets": ("hsslam.slam", "hsslam.cli", "hsslam_eval"),
     "hsslam.io": ("hsslam.slam", "hsslam.cli", "hsslam_eval"),
     "hsslam.mapping": ("hsslam.slam", "hsslam.cli", "hsslam_eval"),
-    "hsslam.slam": ("hsslam.cli", "hsslam_eval"),
+    "hsslam.slam": ("hsslam.live", "hsslam.cli", "hsslam_eval"),
+    "hsslam.live": ("hsslam.cli", "hsslam_eval"),
     "hsslam_eval": ("hsslam.cli", "hsslam_plugins", "evo"),
     "hsslam_plugins": ("hsslam", "hsslam_eval", "evo"),
 }
@@ -145,6 +146,8 @@ def test_arrows_point_one_way() -> None:
         ("hsslam.slam.pipeline", "import hsslam_eval.metrics"),
         ("hsslam.slam.pipeline", "from hsslam import cli"),
         ("hsslam.slam.pipeline", "def f():\n    import hsslam_plugins.hide"),
+        ("hsslam.slam.pipeline", "from hsslam.live import LiveMap"),
+        ("hsslam.live.feed", "from hsslam.cli import console"),
         ("hsslam.datasets.catalogue", "import hsslam.cli.main"),
         ("hsslam.environment", "import hsslam_eval"),
         ("hsslam_eval.trials", "from hsslam.cli import console"),
@@ -178,7 +181,17 @@ def test_optional_packages_are_imported_inside_functions_only() -> None:
         for name, tree, package in parsed()
         for line, imported in imports(tree, name, package, everywhere=False)
         if imported.split(".")[0]
-        in {"open3d", "kiss_icp", "libusb_package", "rosbags", "evo", "pytest", "dask", "distributed"}
+        in {
+            "open3d",
+            "kiss_icp",
+            "libusb_package",
+            "rosbags",
+            "evo",
+            "pytest",
+            "dask",
+            "distributed",
+            "rerun",
+        }
     ]
     assert found == []
 

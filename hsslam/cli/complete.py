@@ -17,6 +17,13 @@ def presets(incomplete: str) -> list[str]:
     return _begin_like(incomplete, set(presets.names()))
 
 
+def viewers(incomplete: str) -> list[str]:
+    """Names of viewers that begin like this."""
+    from hsslam.live.viewers import VIEWERS
+
+    return _begin_like(incomplete, set(VIEWERS))
+
+
 def datasets(incomplete: str) -> list[str]:
     """Names of datasets that begin like this; the shell itself offers files where there is none."""
     from hsslam.datasets import catalogue

@@ -64,6 +64,16 @@ def run(
     resume: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Go on with the run that died in this folder.")
     ] = None,
+    live: Annotated[bool, typer.Option("--live", help="Show the map while it grows.")] = False,
+    viewer: Annotated[
+        str | None,
+        typer.Option(
+            metavar="auto|rerun|matplotlib",
+            help="What --live shows it with; auto: rerun if it is installed, else a window of matplotlib. Without a "
+            "display rerun records to live.rrd in the run folder.",
+            autocompletion=complete.viewers,
+        ),
+    ] = None,
     profile: Annotated[
         bool, typer.Option("--profile", help="Say at the end where the time went, stage by stage.")
     ] = False,
@@ -80,9 +90,12 @@ def run(
     from hsslam.cli.running import run_log, summary
     from hsslam.datasets.catalogue import open_dataset
     from hsslam.datasets.usable import require_returns
+    from hsslam.live.viewers import AUTO, require_viewer
     from hsslam.slam.folder import RunFolder
     from hsslam.slam.journal import Header
 
+    if viewer is not None and not live:
+        raise ConfigError("--viewer says what --live shows the map with; give --live too")
     if resume is not None and out is not None:
         raise ConfigError("--resume goes on in its own folder; leave out --out")
     folder = RunFolder.resume(resume) if resume is not None else None
@@ -108,13 +121,17 @@ def run(
         on_error=policy(header.dataset["on_error"]),
     )
     # What cannot be run is found before a folder is made.
+    if live:
+        require_viewer(viewer or AUTO)
     resolved.matcher.create()
     if folder is None:
         require_returns(log)
         folder = RunFolder.create(out, log.info.name, resolved.matcher.name)
     try:
         with progress(quiet) as shown:
-            metrics, timings = run_log(folder, header, resolved, log, shown)
+            metrics, timings = run_log(
+                folder, header, resolved, log, shown, (viewer or AUTO) if live else None
+            )
     except KeyboardInterrupt as error:
         raise KeyboardInterrupt(f"go on with: hsslam run --resume {folder.path}") from error
     if profile:

@@ -7,45 +7,65 @@ from typing import Any
 
 import numpy as np
 
-from hsslam.cli import accuracy
+from hsslam.cli import accuracy, console
 from hsslam.cli.progress import Progress, Silence, watch_compiler
 from hsslam.config import Config
 from hsslam.datasets.dataset import Dataset
 from hsslam.datasets.file import FileDataset
 from hsslam.environment import peak_memory_mb
+from hsslam.live import LiveMap
 from hsslam.slam.events import LoopChecked, SlamResult
-from hsslam.slam.folder import RunFolder
+from hsslam.slam.folder import RECORDING, RunFolder
 from hsslam.slam.journal import Header
 from hsslam.slam.pipeline import Slam
 from hsslam_eval.accuracy import measure
 
 
 def run_log(
-    folder: RunFolder, header: Header, config: Config, log: Dataset, shown: Progress
+    folder: RunFolder,
+    header: Header,
+    config: Config,
+    log: Dataset,
+    shown: Progress,
+    viewer: str | None = None,
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Run, judge, and write everything; returns what went into metrics.json and timings.json."""
+    """Run, judge, and write everything; returns what went into metrics.json and timings.json.
+
+    ``viewer`` shows the map while it grows; None shows nothing.
+    """
+    title = f"{log.info.name}, {config.matcher.name}"
     total = log.info.scan_count or header.dataset["scans"] or _count(log, shown)
     wall, cpu = time.perf_counter(), time.process_time()
     with watch_compiler(shown), folder.begin(header, config) as journal:
         slam = Slam(config, replay=folder.replay)
+        recording = folder.path / RECORDING
         loops = 0
-        shown.stage("tracking", total, "scans")
-        for done, scan in enumerate(log.scans(), start=1):
-            for event in slam.process(scan):
+        with LiveMap(slam, viewer, recording=recording, title=title, say=console.complain) as live:
+            shown.stage("tracking", total, "scans")
+            for done, scan in enumerate(log.scans(), start=1):
+                events = slam.process(scan)
+                for event in events:
+                    journal.write(event)
+                    loops += isinstance(event, LoopChecked) and event.accepted
+                live.update(events, scan)
+                shown.update(done, f"{loops} loops")
+            tracked, live_online = time.perf_counter(), live.seconds
+            shown.stage("optimising the graph")
+            for event in slam.finish():
                 journal.write(event)
-                loops += isinstance(event, LoopChecked) and event.accepted
-            shown.update(done, f"{loops} loops")
-        tracked = time.perf_counter()
-        shown.stage("optimising the graph")
-        for event in slam.finish():
-            journal.write(event)
-        result = slam.result()
+                live.update([event])
+            result = slam.result()
+            solved = time.perf_counter()
         del slam  # the scans that it keeps would lie beside the picture of the map
-        solved = time.perf_counter()
         shown.stage("drawing the map")
-        folder.write_result(result, config, title=f"{log.info.name}, {config.matcher.name}")
+        drawing = time.perf_counter()
+        folder.write_result(result, config, title=title)
+        written = time.perf_counter()
     metrics = _metrics(result, config, log)
-    timings = _timings(result, folder, cpu, (wall, tracked, solved))
+    timings = _timings(result, folder, cpu, (wall, tracked, solved), written - drawing)
+    if viewer is not None:
+        timings["stages_s"]["live map"] = live.seconds
+        timings["stages_s"][_REST] = max(timings["stages_s"][_REST] - live_online, 0.0)
     folder.write_json("metrics.json", metrics)
     folder.write_json("timings.json", timings)
     return metrics, timings
@@ -104,7 +124,7 @@ def _metrics(result: SlamResult, config: Config, log: Dataset) -> dict[str, Any]
 
 
 def _timings(
-    result: SlamResult, folder: RunFolder, cpu: float, moments: tuple[float, float, float]
+    result: SlamResult, folder: RunFolder, cpu: float, moments: tuple[float, float, float], output: float
 ) -> dict[str, Any]:
     """Times of a run; ``moments`` are its start, the end of the log, and the end of the last optimisation."""
     wall, tracked, solved = moments
@@ -116,8 +136,8 @@ def _timings(
         "cpu_s": time.process_time() - cpu,
         "online_s": tracked - wall,
         "final_s": solved - tracked,
-        "output_s": now - solved,
-        "stages_s": {**_online_stages(result, tracked - wall), "output": now - solved},
+        "output_s": output,
+        "stages_s": {**_online_stages(result, tracked - wall), "output": output},
         "real_time_factor": duration / (now - wall),
         "scans_per_s": len(result.trajectory) / (now - wall),
         "peak_memory_mb": peak_memory_mb(),
@@ -125,6 +145,7 @@ def _timings(
     }
 
 
+_REST = "reading and bookkeeping"
 _AT_THE_END = ("final", "rescan")
 
 
@@ -132,7 +153,7 @@ def _online_stages(result: SlamResult, online: float) -> dict[str, float]:
     """Seconds by stage; what no stage of the online pass counts is reading, bookkeeping and the journal."""
     stages = dict(result.seconds)
     counted = sum(seconds for stage, seconds in stages.items() if stage not in _AT_THE_END)
-    return {**stages, "reading and bookkeeping": max(online - counted, 0.0)}
+    return {**stages, _REST: max(online - counted, 0.0)}
 
 
 def profile(timings: dict[str, Any]) -> list[tuple[str, str]]:

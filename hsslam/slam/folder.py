@@ -40,6 +40,9 @@ FILES = (
 )
 """Everything a finished run leaves; one that died leaves the config, the environment and the journal."""
 
+RECORDING = "live.rrd"
+"""What a run leaves besides where its growing map was recorded (`hsslam.live`)."""
+
 
 class RunFolder:
     """A run's folder; make one with `create`, come back to one with `resume`.
