@@ -101,7 +101,7 @@ def run_blocks(document: Path, place: Path) -> Path:
     path = os.pathsep.join([str(shims), str(Path(sys.executable).parent), os.environ["PATH"]])
     here = str(Path(__file__).parent)
     import_path = os.pathsep.join(filter(None, [str(site), here, os.environ.get("PYTHONPATH")]))
-    environment = {**os.environ, "PATH": path, "PYTHONPATH": import_path, "MPLBACKEND": "Agg"}
+    environment = {**os.environ, "PATH": path, "PYTHONPATH": import_path, "MPLBACKEND": "Agg", "DISPLAY": ""}
     first = next(block for block in blocks(document) if block.runs and block.language == "sh")
     rest = f"import documents, pathlib; documents.run_blocks_here(pathlib.Path({str(document)!r}), 1)"
     for command, text in ((["sh", "-e"], first.text), ([sys.executable, "-c", rest], "")):

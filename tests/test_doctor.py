@@ -6,6 +6,8 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -14,6 +16,18 @@ from typer.testing import CliRunner
 from hsslam import plugin_files
 from hsslam.cli.main import app
 from hsslam.doctor import Finding, examine
+
+
+def without(package: str) -> Callable[[str], str]:
+    """`importlib.metadata.version`, where a package is not installed."""
+    version = metadata.version
+
+    def found(name: str) -> str:
+        if name == package:
+            raise metadata.PackageNotFoundError(name)
+        return version(name)
+
+    return found
 
 
 @pytest.fixture
@@ -43,7 +57,13 @@ def test_broken_and_missing_parts_are_told_apart_and_mended(
     (information / "entry_points.txt").write_text("[hsslam.matchers]\ncrash = crashing:Crash\n")
     monkeypatch.setenv(plugin_files.VARIABLE, str(tmp_path / "gone.py"))
     (tmp_path / "taken").write_text("")
+    (site / "rerun_sdk-7.8.dist-info").mkdir()
+    (site / "rerun_sdk-7.8.dist-info" / "METADATA").write_text("Name: rerun-sdk\nVersion: 7.8\n")
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.setenv("DISPLAY", ":5")
     findings = found(tmp_path / "taken")
+    assert findings["live map"] == Finding("live map", "ok", "shown by rerun-sdk 7.8, or matplotlib")
+    assert findings["display"] == Finding("display", "ok", ":5, for --live")
     assert findings["data folder"].status == "broken"
     assert findings["data folder"].remedy == "export HSSLAM_DATA=/a/folder/of/yours"
     assert findings["packages"].status == "ok"
@@ -54,7 +74,10 @@ def test_broken_and_missing_parts_are_told_apart_and_mended(
         "plugin files", "broken", f"plugin {tmp_path / 'gone.py'}: no such file", "unset HSSLAM_PLUGINS"
     )
     monkeypatch.setenv(plugin_files.VARIABLE, "")
+    monkeypatch.setattr("importlib.metadata.version", without("rerun-sdk"))
     findings = found(tmp_path / "data")
+    assert findings["live map"].status == "missing"
+    assert findings["live map"].remedy == "pip install 'hsslam[live]'"
     assert findings["matcher hide"].status == "ok"
     assert findings["matcher kiss_icp"].status == "missing"
     assert findings["matcher kiss_icp"].remedy == "pip install 'hsslam[kiss-icp]'"
