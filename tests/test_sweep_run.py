@@ -95,6 +95,21 @@ def sweep(*args: str | Path) -> str:
     return result.output
 
 
+def compare(address: str, out: Path) -> None:
+    """The first point of the sweep's grid, as a comparison."""
+    options = ["compare", "office", "--scans", "30", "--matchers", "hide", "--seed", "1", "--trials", "3"]
+    for setting in (
+        "trials.warm_up=1",
+        "trials.resamples=100",
+        "hide.search_points=24",
+        "hide.memory_size=6",
+    ):
+        options += ["--set", setting]
+    options += ["--scheduler", address, "--out", str(out)]
+    result = CliRunner().invoke(app, options, catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+
+
 def rows(out: Path) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = json.loads((out / "sweep.json").read_text())
     return found
@@ -189,7 +204,7 @@ def test_what_is_done_is_not_run_again(local: Path, tmp_path: Path, monkeypatch:
 
     before, was = stamps(), figures(local / "out", "hide")
     assert len(before) == 4
-    monkeypatch.setattr("hsslam_eval.sweep.open_pool", no_pool)
+    monkeypatch.setattr("hsslam_eval.sweep_queue.open_pool", no_pool)
     output = sweep(write(tmp_path / "less.yaml"), "--out", local / "out")
     assert "4 of 4 jobs done" in output
     assert stamps() == before
@@ -281,6 +296,7 @@ def test_a_cluster_gives_the_same_and_survives_the_death_of_workers(
         os.kill(int(marker.read_text()), signal.SIGKILL)
         assert running.wait(PATIENCE) == 0
         sweep(whole, "--scheduler", address, "--out", tmp_path / "out2")
+        compare(address, tmp_path / "compare")
     by_matcher = {row["matcher"]: row for row in rows(tmp_path / "out")}
     assert by_matcher["sweep_waits_once"]["status"] == "done"
     assert by_matcher["sweep_kills_workers"]["status"] == "failed"
@@ -302,3 +318,10 @@ def test_a_cluster_gives_the_same_and_survives_the_death_of_workers(
     missing = [row["reason"] for row in rows(tmp_path / "out2") if row["dataset"] == "intel"]
     assert len(missing) == 4 and all(f"{data}" in reason for reason in missing)
     assert jobs_at_work(scratch) == []
+    compared = sorted(
+        path.relative_to(tmp_path / "compare") for path in tmp_path.glob("compare/jobs/*/run/*")
+    )
+    assert len(compared) > 10
+    for path in compared:
+        if path.name not in ("timings.json", "environment.json"):
+            assert (tmp_path / "compare" / path).read_bytes() == (local / "out" / path).read_bytes(), path

@@ -179,6 +179,12 @@ class DatasetSpec(Section):
             raise DataError(f"{file}: cannot be read: {error.strerror}") from error
         return digest.hexdigest()
 
+    def located(self) -> DatasetSpec:
+        """The same, a log by its full path: for workers, which start in other folders."""
+        from hsslam.datasets.catalogue import join_source
+
+        return self.model_copy(update={"name": join_source(self.name)})
+
     def open(self) -> Dataset:
         """Open it; raises what `open_dataset` raises."""
         from hsslam.datasets.catalogue import open_dataset

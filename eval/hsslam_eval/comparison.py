@@ -329,6 +329,10 @@ class Comparison:
         In the order in which they were asked for.
     notes : list of str
         On what terms runs that were there already are compared.
+    hands : int
+        How many jobs were done at once at most; where more than one, their times are those of a busy machine.
+    hosts : list of str
+        Names of the machines of workers elsewhere that did jobs; ``environment`` is that of this one.
     """
 
     dataset: DatasetRecord
@@ -338,6 +342,8 @@ class Comparison:
     environment: dict[str, Any]
     matchers: list[MatcherOutcome]
     notes: list[str] = field(default_factory=list)
+    hands: int = 1
+    hosts: list[str] = field(default_factory=list)
 
     @property
     def failed(self) -> list[MatcherOutcome]:

@@ -1,13 +1,15 @@
 """A job: one matcher on one dataset with one seed, its trials or its SLAM run.
 
 What a job is, decides its key; a job with a result in its folder is done. So a list of jobs may be run in any order,
-in any process, be interrupted and run again, and what comes out is the same. `hsslam_eval.compare` is such a list.
+in any process, be interrupted and run again, and what comes out is the same. `hsslam_eval.compare` and
+`hsslam_eval.sweep` are such lists.
 
 A job's folder::
 
     job.json      the job
     result.json   its record, there once it is complete
     log.txt       whatever the matcher printed
+    worker.json   where it was done, if by a worker of `hsslam_eval.sweep_pool`
     run/          the run folder of SLAM
 """
 
@@ -15,10 +17,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
@@ -34,8 +36,10 @@ from hsslam_eval.supervise import supervise
 from hsslam_eval.trial_config import TrialConfig
 
 JOB_FILE, RESULT_FILE, LOG_FILE, RUN_FOLDER = "job.json", "result.json", "log.txt", "run"
+WORKER_FILE = "worker.json"
 
 Kind = Literal["trials", "slam"]
+Result: TypeAlias = MatcherTrials | SlamOutcome | Failure
 Listener = Callable[[str, int, int], None]
 """Takes the stage that a job is at, and how far it is: done, total (0 where that is not known)."""
 
@@ -149,9 +153,42 @@ def result_of(job: Job, folder: Path) -> MatcherTrials | SlamOutcome | None:
     return read_record(path, MatcherTrials) if job.kind == "trials" else read_record(path, SlamOutcome)
 
 
+def held(job: Job, folder: Path) -> Result | None:
+    """Read a job's result as `result_of` does; one that cannot be read is a failure."""
+    try:
+        return result_of(job, folder)
+    except DataError as error:
+        return Failure(job.kind, str(error), f"rm {folder / RESULT_FILE}", job.seed)
+
+
+def places(folder: Path, jobs: Mapping[str, Job]) -> dict[str, Path]:
+    """Each job's folder within ``folder``: the one that it has, whatever its matcher was called then, or a new one.
+
+    Parameters
+    ----------
+    folder : path
+        Where folders of jobs are.
+    jobs : mapping
+        Jobs by names of the caller's.
+
+    Returns
+    -------
+    dict
+        Folders by the same names; one for each job.
+    """
+    own = {name: folder / job.name for name, job in jobs.items()}
+    taken = {path.name for path in own.values()}
+    others = {
+        path.name.rpartition("-")[2]: path for path in sorted(folder.glob("*-*")) if path.name not in taken
+    }
+    return {
+        name: path if path.exists() else others.pop(jobs[name].key[:12], path) for name, path in own.items()
+    }
+
+
 def run_job(
     job: Job, folder: Path, limits: LimitSection | None = None, listener: Listener | None = None
-) -> MatcherTrials | SlamOutcome | Failure:
+) -> Result:
     """Do a job in a process of its own, or take its result from its folder where there is one.
 
     A process of its own makes the peak memory that matcher's; one that raises, crashes or hangs costs this job only.
@@ -172,13 +209,11 @@ def run_job(
     MatcherTrials, SlamOutcome or Failure
         A failed job is done anew by the next call.
     """
-    try:
-        found = result_of(job, folder)
-    except DataError as error:
-        return Failure(job.kind, str(error), f"rm {folder / RESULT_FILE}", job.seed)
+    found = held(job, folder)
     if found is not None:
         return found
     folder.mkdir(parents=True, exist_ok=True)
+    (folder / WORKER_FILE).unlink(missing_ok=True)  # of an earlier attempt, elsewhere
     job.save(folder)
     failure: Failure | None = None
     last = ("prepare", 0, 0)

@@ -63,8 +63,8 @@ def equal_terms(study: Study) -> list[str]:
         settings = first.config["trials"]
         told.append(
             "Equal in the trials: the pairs of scans, the points made from them, the guesses, the window searched "
-            f"(±{100.0 * settings['half_xy']:.3g} cm, ±{settings['half_theta_deg']:.3g}°), the clock (one process at a "
-            "time, compiled and warmed up before it starts), and who judges: score, covariance and success are worked "
+            f"(±{100.0 * settings['half_xy']:.3g} cm, ±{settings['half_theta_deg']:.3g}°), the clock ({_clock(study)}"
+            "compiled and warmed up before it starts), and who judges: score, covariance and success are worked "
             "out by the framework, not by the matcher."
         )
     if any(m.runs for c in study.comparisons for m in c.matchers) and "slam" in first.config:
@@ -81,6 +81,28 @@ def equal_terms(study: Study) -> list[str]:
     for comparison in study.comparisons:
         told += [f"{comparison.dataset.name}: {note}" if several else note for note in comparison.notes]
     return told
+
+
+def _clock(study: Study) -> str:
+    """How many jobs the machine had at once while matches were timed."""
+    most = max(comparison.hands for comparison in study.comparisons)
+    if most > 1:
+        return f"up to {most} processes at a time, so that times are those of a busy machine; "
+    return "one process at a time, "
+
+
+def _hands(study: Study) -> str:
+    """How many jobs were done side by side, and where."""
+    most = max(comparison.hands for comparison in study.comparisons)
+    hosts = sorted({host for comparison in study.comparisons for host in comparison.hosts})
+    if most == 1 and not hosts:
+        return "one after the other"
+    where = (
+        f"; also on {', '.join(hosts)}, whose processors may be others: times are not comparable"
+        if hosts
+        else ""
+    )
+    return f"up to {most} side by side{where}"
 
 
 def contestants_table(study: Study) -> Table | None:
@@ -164,6 +186,7 @@ def facts(study: Study) -> list[tuple[str, str]]:
         seed, seeds = int(first.config["seed"]), int(first.config.get("seeds", 1))
         which = str(seed) if seeds == 1 else f"{seed} to {seed + seeds - 1}"
         out.append(("Seeds", f"{which} (pairs, guesses, every matcher's random numbers)"))
+        out.append(("Jobs", _hands(study)))
     out += [
         ("Processor", f"{environment.get('cpu', 'unknown')}, {environment.get('cores', '?')} cores usable"),
         ("System", f"{environment.get('system', '')} ({environment.get('machine', '')})"),

@@ -160,13 +160,11 @@ def _kinds(config: CompareConfig) -> Iterator[Kind]:
 
 def _located(spec: DatasetSpec, seed: int, data_dir: Path | None) -> DatasetSpec:
     """A dataset with its own seed or that of the sweep, a log by its full path: workers start in other folders."""
-    from hsslam.datasets.catalogue import join_source, names
+    from hsslam.datasets.catalogue import names
 
     if spec.name not in names():
         spec.open()
-    return spec.model_copy(
-        update={"name": join_source(spec.name), "seed": _seed_of(spec, seed), "data_dir": data_dir}
-    )
+    return spec.located().model_copy(update={"seed": _seed_of(spec, seed), "data_dir": data_dir})
 
 
 def _seed_of(spec: DatasetSpec, seed: int) -> int:

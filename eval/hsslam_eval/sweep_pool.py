@@ -142,7 +142,7 @@ def open_pool(scheduler: str | None, workers: int) -> Iterator[Pool]:
         import dask
         from distributed import Client, LocalCluster
     except ImportError as error:
-        raise SweepError(f"a sweep needs the library distributed: {INSTALL}") from error
+        raise SweepError(f"jobs over several workers need the library distributed: {INSTALL}") from error
     with ExitStack() as stack:
         try:
             if scheduler is None:

@@ -25,10 +25,7 @@ from hsslam.io.atomic import atomic_path
 from hsslam.version import __version__
 from hsslam_eval.compare_config import LimitSection
 from hsslam_eval.comparison import Failure
-from hsslam_eval.jobs import Job, run_job
-
-WORKER_FILE = "worker.json"
-"""In a job's folder: ``host``, ``seconds`` that the job took there in all, and the ``environment``."""
+from hsslam_eval.jobs import WORKER_FILE, Job, run_job
 
 
 @dataclass(frozen=True)
@@ -43,17 +40,20 @@ class Order:
         `Job` and `LimitSection` as JSON.
     terms : dict
         What must be the same here as where the sweep was started; see `terms_of`.
+    hands : int
+        How many jobs the workers could do at once when it was handed out.
     """
 
     folder: str
     job: str
     limits: str
     terms: dict[str, Any]
+    hands: int
 
 
-def order(job: Job, folder: str, limits: LimitSection) -> Order:
+def order(job: Job, folder: str, limits: LimitSection, hands: int) -> Order:
     """Make the order of a job; raises `DataError` where its log cannot be read."""
-    return Order(folder, job.model_dump_json(), limits.model_dump_json(), terms_of(job))
+    return Order(folder, job.model_dump_json(), limits.model_dump_json(), terms_of(job), hands)
 
 
 def terms_of(job: Job) -> dict[str, Any]:
@@ -99,12 +99,27 @@ def do(order: Mapping[str, Any]) -> dict[str, Any]:
         except HsslamError as error:
             done = Failure(kind, str(error), "", seed)
         seconds = perf_counter() - began
-        told = {"host": platform.node(), "seconds": seconds, "environment": environment()}
+        told = {
+            "host": platform.node(),
+            "seconds": seconds,
+            "hands": order["hands"],
+            "environment": environment(),
+        }
         (folder / WORKER_FILE).write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
         return {
             "files": _packed(folder),
             "failure": asdict(done) if isinstance(done, Failure) else None,
         }
+
+
+def told_by(folder: Path) -> dict[str, Any]:
+    """What a worker said of a job that it did: ``host``, ``seconds`` in all, ``hands``, ``environment``.
+
+    Empty where the job was done without workers.
+    """
+    path = folder / WORKER_FILE
+    told: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    return told
 
 
 def unpack(files: bytes, folder: Path) -> None:

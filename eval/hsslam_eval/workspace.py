@@ -2,7 +2,8 @@
 
 ::
 
-    compare.yaml         the resolved config, the datasets and the version: another comparison is refused
+    compare.yaml         the resolved config, the datasets and the version: another comparison is refused, unless it is
+                         the same and more
     jobs/NAME/           a job's folder, see `hsslam_eval.jobs`
     comparison.json      everything put together
 """
@@ -23,7 +24,6 @@ from hsslam.io.atomic import atomic_path
 from hsslam.settings_file import read_yaml
 from hsslam.version import __version__
 from hsslam_eval.compare_config import CompareConfig, DatasetSpec
-from hsslam_eval.jobs import Job
 
 _FILE = "compare.yaml"
 
@@ -50,12 +50,12 @@ class Workspace:
     def prepare(
         cls, out: Path, config: CompareConfig, datasets: DatasetSpec | Sequence[DatasetSpec]
     ) -> Workspace:
-        """Make the folder, or come back to it.
+        """Make the folder, or come back to it, perhaps with more to compare.
 
         Raises
         ------
         ConfigError
-            It holds another comparison: says in which settings.
+            It holds another comparison, or one that asks for more: says in which settings.
         DataError
             It holds something else, or cannot be made.
         """
@@ -66,7 +66,8 @@ class Workspace:
         except OSError as error:
             raise DataError(f"{out}: the folder cannot be made: {error.strerror}") from error
         if _FILE in held:
-            _check_same(out, read_yaml(out / _FILE), workspace._identity())
+            was, now = read_yaml(out / _FILE), workspace._identity()
+            _check_same(out, was, _without_growth(was, now))
         elif held:
             raise DataError(
                 f"{out}: holds something else than a comparison ({held[0]}); choose another folder"
@@ -75,9 +76,10 @@ class Workspace:
             temporary.write_text(yaml.safe_dump(workspace._identity(), sort_keys=False), encoding="utf-8")
         return workspace
 
-    def folder(self, job: Job) -> Path:
-        """Where a job's files go."""
-        return self.out / "jobs" / job.name
+    @property
+    def jobs_folder(self) -> Path:
+        """Where the jobs' folders are."""
+        return self.out / "jobs"
 
     def _identity(self) -> dict[str, Any]:
         """What decides the results: where the data lie and how long a matcher may take do not."""
@@ -88,6 +90,22 @@ class Workspace:
             "config": config,
             "plugins": plugin_files.fingerprints(),
         }
+
+
+def _without_growth(was: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, Any]:
+    """``now``, with what it has beyond ``was`` left out: no job that is done would be another one for it."""
+    before, config = was.get("config") or {}, dict(now["config"])
+    if before.get("seeds", 0) <= config["seeds"]:
+        config["seeds"] = before.get("seeds")
+    for switch in ("run_trials", "run_slam"):
+        config[switch] = config[switch] and before.get(switch)
+    config["matchers"] = _old_part(before.get("matchers"), config["matchers"])
+    return {**now, "config": config, "datasets": _old_part(was.get("datasets"), now["datasets"])}
+
+
+def _old_part(was: Any, now: list[Any]) -> list[Any]:
+    """The items that were there before, in their order then, if all of them still are."""
+    return was if isinstance(was, list) and all(item in now for item in was) else now
 
 
 def _check_same(out: Path, was: Mapping[str, Any], now: Mapping[str, Any]) -> None:

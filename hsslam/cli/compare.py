@@ -16,6 +16,8 @@ from hsslam.cli import complete, console, interrupt
 from hsslam.cli.options import DataDir, OnError, Plugin, Quiet, Scans, Seed, policy
 from hsslam.cli.progress import Progress, progress
 from hsslam.cli.settings import split
+from hsslam.cli.workers import Scheduler, check
+from hsslam.cli.workers import Tell as TellWorkers
 from hsslam.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -128,16 +130,27 @@ def compare(
             metavar="DIR", help="For the report and the runs; runs/<time>-<dataset>-compare if left out."
         ),
     ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Do N jobs side by side, in local processes; 1 if left out: times are comparable only so.",
+        ),
+    ] = None,
+    scheduler: Scheduler = None,
     quiet: Quiet = False,
 ) -> None:
     """Compare matchers: trials, SLAM, and a report.
 
     Trials with known truth and SLAM with each matcher; tables here, and a report in HTML, Markdown and CSV.
-    Given the folder of an earlier comparison, goes on with what is missing in it.
+    Given the folder of an earlier comparison, goes on with what is missing in it, also where more seeds, matchers or
+    datasets are asked for than then.
     """
-    from hsslam_eval.compare import DatasetSpec, compare_datasets, part_names
+    from hsslam_eval.compare import DatasetSpec, Hands, compare_datasets, part_names
     from hsslam_eval.report import write_report
 
+    check(scheduler, workers, data_dir)
     named = _datasets(name, dataset, split(datasets or ()))
     given = {
         "seed": seed,
@@ -159,7 +172,10 @@ def compare(
     try:
         with progress(quiet) as shown:
             tell = Tell(shown, part_names(resolved, specs))
-            study = compare_datasets(resolved, specs, folder, tell, command=command)
+            hands = None
+            if scheduler is not None or (workers or 1) > 1:
+                hands = Hands(workers or 1, scheduler, TellWorkers(shown, "comparison"))
+            study = compare_datasets(resolved, specs, folder, tell, command=command, hands=hands)
             shown.stage("writing the report")
             write_report(study, folder)
     except KeyboardInterrupt as error:

@@ -12,11 +12,10 @@ import typer
 
 from hsslam.cli import console
 from hsslam.cli.options import DataDir, Plugin, Quiet
-from hsslam.cli.progress import Progress, progress
-from hsslam.errors import ConfigError
+from hsslam.cli.progress import progress
+from hsslam.cli.workers import Scheduler, Tell, check
 
 if TYPE_CHECKING:
-    from hsslam_eval.sweep import Status
     from hsslam_eval.sweep_config import SweepConfig
 
 
@@ -28,12 +27,7 @@ def sweep(
         int | None,
         typer.Option(min=1, metavar="N", help="Local worker processes; one for each core if left out."),
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS", help="Hand the jobs to a Dask cluster that runs already: tcp://host:8786."
-        ),
-    ] = None,
+    scheduler: Scheduler = None,
     plugin: Plugin = None,
     data_dir: DataDir = None,
     out: Annotated[
@@ -53,13 +47,7 @@ def sweep(
     from hsslam_eval.sweep import sweep as run_sweep
     from hsslam_eval.sweep_table import CSV_FILE, read_tables
 
-    if scheduler is not None and workers is not None:
-        raise ConfigError("--workers starts local ones, --scheduler has its own; give one of the two")
-    if scheduler is not None and data_dir is not None:
-        raise ConfigError(
-            "--data-dir is for local workers; those of a scheduler look in their own data directory "
-            "(set HSSLAM_DATA where they start)"
-        )
+    check(scheduler, workers, data_dir)
     config = read(file)
     folder = out if out is not None else Path("runs") / f"{datetime.now():%Y%m%d-%H%M%S}-{file.stem}-sweep"
     try:
@@ -70,7 +58,7 @@ def sweep(
                 workers=workers if workers is not None else int(environment()["cores"]),
                 scheduler=scheduler,
                 data_dir=data_dir,
-                progress=Tell(shown),
+                progress=Tell(shown, "sweep"),
                 source=str(file),
             )
     except KeyboardInterrupt as error:
@@ -98,20 +86,3 @@ def read(file: Path) -> SweepConfig:
     items = listed if isinstance(listed, list) else []
     registry.quarantine(str(item.get("name") if isinstance(item, dict) else item) for item in items)
     return validate(SweepConfig, data, source=str(file))
-
-
-class Tell:
-    """Turns what `hsslam_eval.sweep.sweep` tells into progress."""
-
-    def __init__(self, shown: Progress) -> None:
-        self._shown = shown
-        self._began = False
-
-    def __call__(self, status: Status) -> None:
-        """Take a step."""
-        if not self._began:
-            self._began = True
-            self._shown.stage("sweep", status.total, "jobs")
-        notes = [f"{status.failed} failed"] if status.failed else []
-        notes.append(f"{status.hands} at once" if status.hands else "waiting for a worker")
-        self._shown.update(status.done + status.failed, ", ".join(notes))
