@@ -13,6 +13,9 @@ from typer.testing import CliRunner, Result
 
 from hsslam import plugin_files
 from hsslam.cli.main import app
+from hsslam.errors import ConfigError
+from hsslam_eval.compare import CompareConfig, DatasetSpec, compare_datasets
+from hsslam_eval.workspace import Workspace
 
 PLUGIN = """
 import ctypes
@@ -83,35 +86,59 @@ def test_workers_find_the_same_and_the_page_says_that_there_were_some(serial: Pa
         assert clock in text and jobs in text
 
 
-def test_a_folder_takes_more_and_does_only_what_is_missing(serial: Path) -> None:
-    def stamps() -> dict[Path, int]:
-        return {path: path.stat().st_mtime_ns for path in serial.glob("jobs/*/result.json")}
+OFFICE, HALL = (DatasetSpec(name=name, scans=30) for name in ("office", "hall"))
 
+
+def config(*matchers: str, **changes: Any) -> CompareConfig:
+    trials = {"count": 2, "warm_up": 1, "resamples": 100}
+    return CompareConfig.model_validate(
+        {"matchers": matchers, "trials": trials, "run_slam": False, **changes}
+    )
+
+
+def test_a_folder_takes_more_and_does_only_what_is_missing(tmp_path: Path) -> None:
+    def stamps() -> dict[Path, int]:
+        return {path: path.stat().st_mtime_ns for path in tmp_path.glob("jobs/*/result.json")}
+
+    compare_datasets(config("hide"), [OFFICE], tmp_path)
     before = stamps()
     assert len(before) == 1
-    result = hsslam(
-        "--matchers",
-        "hsl,compare_segfault,hide",
-        "--seeds",
-        "2",
-        "--out",
-        serial,
-    )
-    assert result.exit_code == 0, result.output
-    after = stamps()
-    assert len(after) == 4
-    assert {path: after[path] for path in before} == before
-    grown = {matcher["label"]: matcher for matcher in comparison(serial)["matchers"]}
-    assert list(grown) == ["hsl", "compare_segfault", "hide"]
-    for label in ("hide", "hsl"):
-        assert grown[label]["trials"]["data"]["seed"] == [0, 0, 0, 1, 1, 1]
-    result = hsslam("--matchers", "hsl,compare_segfault,hide", "--out", serial)
-    assert result.exit_code == 2
-    assert "holds another comparison (config.seeds was 2, now 1)" in result.stderr
-    result = hsslam("--matchers", "hide,compare_segfault", "--seeds", "2", "--out", serial)
-    assert result.exit_code == 2
-    assert "config.matchers" in result.stderr
-    assert stamps() == after
+    (found,) = compare_datasets(config("hsl", "hide", seeds=2), [OFFICE], tmp_path).comparisons
+    assert len(stamps()) == 4
+    assert {path: stamps()[path] for path in before} == before
+    assert [matcher.label for matcher in found.matchers] == ["hsl", "hide"]
+    assert all(m.trials is not None and m.trials.data.seed == [0, 0, 1, 1] for m in found.matchers)
+
+
+GROWN = config("hsl", "hide", seeds=2)
+
+
+@pytest.mark.parametrize(
+    ("other", "datasets", "said"),
+    [
+        (config("hide", "hsl", seeds=3, run_slam=True), [OFFICE, HALL], ""),
+        (GROWN, [HALL, OFFICE], ""),
+        (config("hsl", "hide"), [OFFICE], "(config.seeds was 2, now 1)"),
+        (config("hide", seeds=2), [OFFICE], 'config.matchers.0.name was "hsl", now "hide"'),
+        (GROWN, [HALL], 'datasets.0.name was "office", now "hall"'),
+        (
+            config("hsl", "hide", seeds=2, run_slam=True, run_trials=False),
+            [OFFICE],
+            "config.run_trials was true",
+        ),
+        (config("hsl", "hide", seeds=2, trials={"count": 3}), [OFFICE], "config.trials.count was 2, now 3"),
+    ],
+)
+def test_more_is_the_same_comparison_and_less_or_other_is_not(
+    tmp_path: Path, other: CompareConfig, datasets: list[DatasetSpec], said: str
+) -> None:
+    Workspace.prepare(tmp_path, GROWN, [OFFICE])
+    if not said:
+        Workspace.prepare(tmp_path, other, datasets)
+        said = "holds another comparison"  # from here on, what there was first is less
+        other, datasets = GROWN, [OFFICE]
+    with pytest.raises(ConfigError, match=re.escape(said)):
+        Workspace.prepare(tmp_path, other, datasets)
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ from pydantic import Field, field_validator, model_serializer, model_validator
 
 from hsslam.config import merge, validate
 from hsslam.errors import ConfigError
-from hsslam_eval.compare import jobs_of
 from hsslam_eval.compare_config import CompareConfig, Contestant, DatasetSpec
+from hsslam_eval.compare_jobs import jobs_of
 from hsslam_eval.jobs import Job, Kind
 
 Grid: TypeAlias = Annotated[dict[str, Annotated[list[Any], Field(min_length=1)]], Field(min_length=1)]

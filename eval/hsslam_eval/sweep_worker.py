@@ -102,7 +102,7 @@ def do(order: Mapping[str, Any]) -> dict[str, Any]:
         told = {
             "host": platform.node(),
             "seconds": seconds,
-            "hands": order["hands"],
+            "hands": order.get("hands", 1),
             "environment": environment(),
         }
         (folder / WORKER_FILE).write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")

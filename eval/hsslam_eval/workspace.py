@@ -112,7 +112,7 @@ def _check_same(out: Path, was: Mapping[str, Any], now: Mapping[str, Any]) -> No
     before, after = (_flat(side) for side in (was, now))
     different = [
         f"{key} was {before.get(key, 'unset')}, now {after.get(key, 'unset')}"
-        for key in sorted({*before, *after})
+        for key in sorted({*before, *after}, key=lambda key: (not key.endswith((".label", ".name")), key))
         if before.get(key) != after.get(key)
     ]
     if different:
