@@ -26,6 +26,9 @@ EDGE = 0.9
 SOONER = 1.0 / 3.0
 """Share of the usual way to the next keyframe after which one is made where the submap explains too little."""
 
+EDGE_GAIN = 0.05
+"""An answer beyond the window is believed only if its score is this much higher: among many places one seems better."""
+
 RECOVERY_GAIN = 0.1
 """Odometry is overruled only by an answer whose score is this much higher."""
 
@@ -151,7 +154,7 @@ class Tracker:
     ) -> MatchResult:
         """Search the widest window around the prediction: what a narrow one found at its edge was cut off by it."""
         wide = match_within(self._matcher, reference, points, predicted, self._widest, self._window, rng)
-        better = wide.converged and (not first.converged or wide.score > first.score)
+        better = wide.converged and (not first.converged or wide.score > first.score + EDGE_GAIN)
         return replace(wide if better else first, evaluations=first.evaluations + wide.evaluations)
 
     def _recover(
