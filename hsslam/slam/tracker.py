@@ -26,7 +26,7 @@ EDGE = 0.9
 SOONER = 1.0 / 3.0
 """Share of the usual way to the next keyframe after which one is made where the submap explains too little."""
 
-EDGE_GAIN = 0.05
+EDGE_GAIN = 0.02
 """An answer beyond the window is believed only if its score is this much higher: among many places one seems better."""
 
 RECOVERY_GAIN = 0.1
