@@ -67,6 +67,7 @@ def test_broken_and_missing_parts_are_told_apart_and_mended(
     assert findings["data folder"].status == "broken"
     assert findings["data folder"].remedy == "export HSSLAM_DATA=/a/folder/of/yours"
     assert findings["packages"].status == "ok"
+    assert {"ROS bags", "sweeps"} <= findings.keys()  # extras that a verb needs
     assert findings["kernel cache"].status == "ok"
     assert findings["dataset intel"].status == "missing"
     assert "fetch intel --data-dir" in findings["dataset intel"].remedy
@@ -112,8 +113,3 @@ def test_without_a_place_for_a_cache_kernels_still_compile() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "42", done.stderr
-
-
-def test_it_knows_every_extra_that_a_verb_needs() -> None:
-    parts = {finding.what for finding in examine()}
-    assert {"ROS bags", "sweeps"} <= parts
