@@ -54,7 +54,7 @@ class Incremental:
         Raises
         ------
         GraphError
-            The solution is not finite.
+            The solution is not finite, or constraints leave a pose open.
         """
         news = self._edges[len(self._edges) - self._waiting :]
         frozen = len(poses) - ACTIVE if len(poses) - self._first > 2 * ACTIVE else self._first
@@ -63,7 +63,10 @@ class Incremental:
         if frozen != self._first:
             self._isam, self._first, self._known = _isam(), frozen, frozen
             news = self._edges
-        self._isam.update(self._factors(news, poses), self._values(poses))
+        try:
+            self._isam.update(self._factors(news, poses), self._values(poses))
+        except RuntimeError:
+            self._start_over(poses)
         self._waiting, self._thaws, self._known = 0, False, len(poses)
         solution = gtsam.utilities.extractPose2(self._isam.calculateEstimate())  # in the order of their keys
         if not np.isfinite(solution).all():
@@ -71,6 +74,14 @@ class Incremental:
                 "the pose graph's solution is not finite; a constraint or its covariance is unusable"
             )
         poses[self._first :] = solution
+
+    def _start_over(self, poses: Poses) -> None:
+        """Solve all anew by QR: iSAM2's usual factors lose digits where a loop pulls far, and it then gives up."""
+        self._isam, self._known = _isam("QR"), self._first
+        try:
+            self._isam.update(self._factors(self._edges, poses), self._values(poses))
+        except RuntimeError as error:
+            raise GraphError(f"the constraints do not fix every pose: {error}") from error
 
     def _factors(self, edges: list[Edge], poses: Poses) -> Any:
         graph = gtsam.NonlinearFactorGraph()
@@ -92,7 +103,8 @@ class Incremental:
         return values
 
 
-def _isam() -> Any:
+def _isam(factorisation: str = "CHOLESKY") -> Any:
     params = gtsam.ISAM2Params()
+    params.setFactorization(factorisation)
     params.relinearizeSkip = 1  # updates are rare: only loops cause them, and a loop moves a lot
     return gtsam.ISAM2(params)
