@@ -145,7 +145,7 @@ def draw(blocks: list[Block], path: Path) -> None:
         stages.plot(scans, [1e3 * block.seconds.get(stage, 0.0) / size for block in blocks], label=stage)
     stages.set(xlabel="thousand scans", ylabel="wall time per scan by stage (ms)", ylim=(0, None))
     stages.legend()
-    figure.savefig(path, dpi=120)
+    figure.savefig(path, dpi=72)
 
 
 def main() -> None:
