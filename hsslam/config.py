@@ -105,6 +105,10 @@ class TrackerSection(Section):
         description="weigh the match and odometry's prediction by their covariances (a Kalman update)",
     )
     recovery_window: WindowSection = WindowSection(half_x=0.75, half_y=0.75, half_theta_deg=60.0)
+    deskew: bool = Field(
+        default=True,
+        description="undo the robot's motion during a scan, where the log tells how long that takes",
+    )
 
 
 class KeyframeSection(Section):

@@ -25,12 +25,15 @@ class ScanGeometry:
         Ranges below it are no returns (m).
     range_max : float
         Ranges at or over it are no returns (m).
+    time_increment : float
+        Time from a beam to the next (s); 0 where all are taken at once, or nothing is known of it.
     """
 
     angle_min: float
     angle_increment: float
     range_min: float = 0.0
     range_max: float = np.inf
+    time_increment: float = 0.0
 
     def angles(self, beams: int) -> NDArray[np.float64]:
         """Angles (rad) of the first ``beams`` beams, (beams,)."""
@@ -51,17 +54,21 @@ class LaserScan:
     Parameters
     ----------
     stamp : float
-        When it was taken (s), as recorded. Stamps may repeat or step back; the order of scans is their index.
+        When its first beam was taken (s), as recorded. Stamps may repeat or step back; the order of scans is their
+        index.
     ranges : float64 (B,)
         Measured ranges (m), any number of beams.
     geometry : ScanGeometry
         Beam angles and range limits.
     odometry : Pose
-        Pose of the robot in the odometry frame when the scan was taken.
+        Pose of the robot in the odometry frame at the stamp.
     laser_pose : Pose
         Pose of the laser in the robot's frame.
     index : int
         Number of the scan in its log, from 0.
+    velocity : Pose
+        Velocity of the robot while the beams went round (m/s, m/s, rad/s), in its own frame: `robot_points` are
+        moved by it to where the robot of the stamp sees them. Zero: they are left as recorded.
     """
 
     stamp: float
@@ -70,6 +77,7 @@ class LaserScan:
     odometry: Pose = field(default_factory=_origin)
     laser_pose: Pose = field(default_factory=_origin)
     index: int = 0
+    velocity: Pose = field(default_factory=_origin)
 
     @cached_property
     def valid(self) -> NDArray[np.bool_]:
@@ -87,5 +95,21 @@ class LaserScan:
 
     @cached_property
     def robot_points(self) -> Points:
-        """Returns in the robot's frame in beam order, (N, 2) m."""
-        return transform(self.laser_pose, self.points) if self.laser_pose.any() else self.points
+        """Returns in the frame of the robot at the stamp, in beam order, (N, 2) m."""
+        points = transform(self.laser_pose, self.points) if self.laser_pose.any() else self.points
+        if self.geometry.time_increment == 0.0 or not self.velocity.any():
+            return points
+        seconds = self.geometry.time_increment * np.flatnonzero(self.valid)
+        return _moved(points, seconds[:, None] * self.velocity)
+
+
+def _moved(points: Points, twists: NDArray[np.float64]) -> Points:
+    """Points, each seen after a motion by its twist (N, 3), as seen before it: the exponential map of SE(2)."""
+    x, y, turn = twists.T
+    # sin(turn) / turn and (1 - cos(turn)) / turn, which have limits at 0.
+    along, across = np.sinc(turn / np.pi), np.sin(0.5 * turn) * np.sinc(0.5 * turn / np.pi)
+    c, s = np.cos(turn), np.sin(turn)
+    px, py = points.T
+    return np.column_stack(
+        (c * px - s * py + along * x - across * y, s * px + c * py + across * x + along * y)
+    )

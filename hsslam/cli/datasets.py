@@ -143,7 +143,7 @@ def simulate(
     scans: Scans = None,
     seed: Seed = None,
     laser: Annotated[
-        str, typer.Option(metavar="PRESET", help="The simulated laser: sick-lms200 or urg-04lx.")
+        str, typer.Option(metavar="PRESET", help="The simulated laser: sick-lms200, urg-04lx or rplidar-a2.")
     ] = "sick-lms200",
     quiet: Quiet = False,
 ) -> None:

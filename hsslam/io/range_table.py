@@ -28,7 +28,14 @@ _TURNS = 1.5
 """More than any laser's sweep covers; a full one may overlap itself a little."""
 
 _REQUIRED = ("angle_min", "angle_increment")
-_OPTIONAL = {"range_min": 0.0, "range_max": math.inf, "laser_x": 0.0, "laser_y": 0.0, "laser_theta": 0.0}
+_OPTIONAL = {
+    "range_min": 0.0,
+    "range_max": math.inf,
+    "time_increment": 0.0,
+    "laser_x": 0.0,
+    "laser_y": 0.0,
+    "laser_theta": 0.0,
+}
 
 
 def read_range_csv(
@@ -40,7 +47,8 @@ def read_range_csv(
     """Read scans from CSV as a stream.
 
     Comment lines ``# angle_min=-1.57 angle_increment=0.01745`` (rad) come first; ``range_min``, ``range_max``
-    (m), ``laser_x``, ``laser_y`` (m) and ``laser_theta`` (rad) may stand there too. Then the header
+    (m), ``time_increment`` (s from beam to beam), ``laser_x``, ``laser_y`` (m) and ``laser_theta`` (rad) may stand
+    there too. Then the header
     ``stamp,x,y,theta,r0,r1,...`` and a scan a line. An empty field, ``nan`` and ``inf`` are no returns.
 
     Raises
@@ -111,7 +119,7 @@ def read_range_npz(path: Path | str) -> Iterator[LaserScan]:
 
     Its arrays: ``ranges`` (N, B) m, ``angle_min`` and ``angle_increment`` (rad); where they are there
     ``stamps`` (N,) s, else the scan's number stands in, ``poses`` (N, 3) of the robot by odometry, else zeros,
-    ``range_min``, ``range_max`` (m), ``laser_pose`` (3,).
+    ``range_min``, ``range_max`` (m), ``time_increment`` (s), ``laser_pose`` (3,).
 
     Raises
     ------
@@ -125,7 +133,7 @@ def read_range_npz(path: Path | str) -> Iterator[LaserScan]:
         raise DataError(f"{path}: ranges holds no scan: its shape is {ranges.shape}")
     settings = {
         key: float(_array(path, arrays, key, 0))
-        for key in (*_REQUIRED, "range_min", "range_max")
+        for key in (*_REQUIRED, "range_min", "range_max", "time_increment")
         if key in arrays
     }
     stamps = np.arange(count, dtype=np.float64)
@@ -169,6 +177,7 @@ def write_range_npz(path: Path | str, scans: Iterable[LaserScan]) -> int:
             angle_increment=np.float64(geometry.angle_increment),
             range_min=np.float64(geometry.range_min),
             range_max=np.float64(geometry.range_max),
+            time_increment=np.float64(geometry.time_increment),
         )
     return len(kept)
 
@@ -205,7 +214,7 @@ def _laser(settings: Mapping[str, float], beams: int, path: str) -> tuple[ScanGe
             f"{path}: {beams} beams, {told['angle_increment']:g} rad apart (angle_increment), would be {turns:.3g} "
             "turns; expected radians: are these degrees?"
         )
-    geometry = ScanGeometry(*(told[key] for key in (*_REQUIRED, "range_min", "range_max")))
+    geometry = ScanGeometry(*(told[key] for key in (*_REQUIRED, "range_min", "range_max", "time_increment")))
     return geometry, _wrapped(np.array([told["laser_x"], told["laser_y"], told["laser_theta"]]))
 
 
@@ -213,6 +222,8 @@ def _told(scan: LaserScan) -> dict[str, float]:
     g = scan.geometry
     laser = dict(zip(("laser_x", "laser_y", "laser_theta"), scan.laser_pose.tolist(), strict=True))
     limits = {"range_min": float(g.range_min), "range_max": float(g.range_max)}
+    if g.time_increment != 0.0:
+        limits["time_increment"] = float(g.time_increment)
     return {"angle_min": float(g.angle_min), "angle_increment": float(g.angle_increment), **limits, **laser}
 
 

@@ -29,6 +29,7 @@ FROM_TF = "tf"
 _HISTORY = 20_000_000_000
 _FAR = 500_000_000
 _DAY = 86_400_000_000_000
+_LONGEST_SWEEP = 2.0
 _USUAL_BASES = ("base_footprint", "base_link")
 
 
@@ -90,7 +91,7 @@ def read_bag(
     the ends the nearest. Where the laser sits comes from the transforms, by the frames that the messages name;
     where nothing tells, it sits at the robot's origin, and ``statistics.notes`` says so. A laser that hangs
     upside down has its beams turned round. Stamps are the messages' own; where they are 0, the moment of
-    recording. Ranges are 32-bit floats in a bag, and so are angles.
+    recording. Ranges are 32-bit floats in a bag, and so are angles. A stamp is that of the first beam, as ROS has it.
 
     Parameters
     ----------
@@ -255,6 +256,7 @@ def _scan(message: Any, stamp: int, odometry: Pose, mounting: Mounting, index: i
         sign * float(message.angle_increment),
         float(message.range_min),
         float(message.range_max),
+        _time_increment(message),
     )
     ranges = np.asarray(message.ranges, dtype=np.float64)
     # A whole number of nanoseconds over 1e9 is the double nearest to the stamp.
@@ -262,11 +264,21 @@ def _scan(message: Any, stamp: int, odometry: Pose, mounting: Mounting, index: i
 
 
 @lru_cache(maxsize=16)
-def _geometry(start: float, step: float, least: float, most: float) -> ScanGeometry:
+def _geometry(start: float, step: float, least: float, most: float, seconds: float) -> ScanGeometry:
     # Some drivers leave the limits at 0 or NaN.
     return ScanGeometry(
-        start, step, max(least, 0.0) if least == least else 0.0, most if most > 0.0 else np.inf
+        start, step, max(least, 0.0) if least == least else 0.0, most if most > 0.0 else np.inf, seconds
     )
+
+
+def _time_increment(message: Any) -> float:
+    """Time from beam to beam (s); 0 where it is none, or such that the beams took longer than the scan."""
+    seconds, scan_time = float(message.time_increment), float(message.scan_time)
+    if not 0.0 < seconds < _LONGEST_SWEEP / max(len(message.ranges), 1):
+        return 0.0
+    if scan_time > 0.0 and seconds * len(message.ranges) > 1.1 * scan_time:
+        return 0.0
+    return seconds
 
 
 def _check(message: Message) -> None:

@@ -65,6 +65,18 @@ class MotionModel:
         moved = self._last_motion * self._stretch(scan.stamp - self._stamp)
         return moved, self.covariance(moved) + np.diag([0.05**2, 0.05**2, math.radians(3.0) ** 2])
 
+    def velocity(self, scan: LaserScan) -> Pose:
+        """Velocity (m/s, m/s, rad/s) from the last scan to this, in the robot's frame; 0 where stamps do not tell."""
+        seconds = scan.stamp - self._stamp
+        if seconds <= 0.0:
+            return np.zeros(3)
+        moved, _ = self.predict(scan)
+        # The step of a motion at constant velocity: the logarithm of SE(2).
+        half = 0.5 * moved[2]
+        scale = half / math.tan(half) if abs(half) > 1e-9 else 1.0
+        step = np.array([scale * moved[0] + half * moved[1], scale * moved[1] - half * moved[0], moved[2]])
+        return step / seconds
+
     def observe(self, scan: LaserScan, motion: Pose) -> None:
         """Take note of what the match of a scan said about the motion since the last."""
         still = bool((scan.odometry == self._odometry).all())

@@ -95,6 +95,7 @@ class Slam:
             yield self._record(scan, 0, first)
             yield self._keep(scan)
             return
+        scan = self._tracker.deskewed(scan)
         tracked = self._tracker.track(scan, scan.robot_points, self._known(scan.index))
         newest = len(self._graph) - 1
         yield self._record(scan, newest, tracked)

@@ -77,6 +77,12 @@ class Tracker:
         self._motion.start(scan)
         self._submap.add(points, np.zeros(3))
 
+    def deskewed(self, scan: LaserScan) -> LaserScan:
+        """The next scan, with the velocity at which its beams went round; as it is where that is not to be undone."""
+        if not self._config.tracker.deskew or scan.geometry.time_increment == 0.0:
+            return scan
+        return replace(scan, velocity=self._motion.velocity(scan))
+
     def track(self, scan: LaserScan, points: Points, known: TrackedScan | None = None) -> TrackedScan:
         """Find a scan's pose seen from the newest keyframe.
 

@@ -17,8 +17,8 @@ from hsslam.datasets.simulator.plans import floor_plan
 from hsslam.datasets.simulator.raycast import raycast
 from hsslam.errors import ConfigError
 from hsslam.io.relations import Relations
-from hsslam.scan import LaserScan
-from hsslam.se2 import Pose, Poses, compose_many
+from hsslam.scan import LaserScan, ScanGeometry
+from hsslam.se2 import Pose, Poses, between_many, compose_many
 from hsslam.trajectory import Trajectory
 
 DEFAULT_SCANS = {"office": 750, "corridor": 400, "hall": 480}
@@ -45,7 +45,7 @@ class SimulatedDataset:
     scans : int, optional
         How many; by default what suits the world.
     laser : str or LaserModel
-        A preset's name (``sick-lms200``, ``urg-04lx``) or a model.
+        A preset's name (``sick-lms200``, ``urg-04lx``, ``rplidar-a2``) or a model.
     odometry : OdometryModel, optional
         How odometry errs.
     laser_pose : Pose, optional
@@ -92,7 +92,12 @@ class SimulatedDataset:
     @cached_property
     def poses(self) -> Poses:
         """True poses of the robot, (count, 3)."""
-        return drive(self.plan.route, self.count, self._rng(0), self.motion)
+        return self._driven[:-1]
+
+    @cached_property
+    def _driven(self) -> Poses:
+        """`poses`, and where the robot is one scan later."""
+        return drive(self.plan.route, self.count + 1, self._rng(0), self.motion)
 
     @cached_property
     def odometry(self) -> Poses:
@@ -130,12 +135,32 @@ class SimulatedDataset:
 
     def _ranges(self, first: int, last: int) -> NDArray[np.float64]:
         robot = self.poses[first:last]
-        laser = compose_many(robot, np.tile(self.laser_pose, (len(robot), 1)))
-        distances = raycast(self.plan.segments, laser, self.laser.geometry, self.laser.beams)
+        if self.laser.time_increment > 0.0:
+            distances = self._swept(first, last)
+        else:
+            laser = compose_many(robot, np.tile(self.laser_pose, (len(robot), 1)))
+            distances = raycast(self.plan.segments, laser, self.laser.geometry, self.laser.beams)
         # Noise of a whole block is drawn, so that a log cut short begins like a longer one.
         padded = np.full((_BLOCK, self.laser.beams), np.inf)
         padded[: len(distances)] = distances
         return self.laser.measure(padded, self._rng(2, first // _BLOCK))[: len(distances)]
+
+    def _swept(self, first: int, last: int) -> NDArray[np.float64]:
+        """Distances of scans whose every beam is cast from where the robot is by then."""
+        beams, geometry = self.laser.beams, self.laser.geometry
+        steps = between_many(self._driven[first:last], self._driven[first + 1 : last + 1])
+        shares = self.laser.time_increment * np.arange(beams) * self.motion.rate
+        moved = steps[:, None, :] * shares[None, :, None]
+        # From scan to scan the robot goes an arc: halfway through a turn it heads for half of it.
+        robot = np.repeat(self._driven[first:last], beams, axis=0)
+        bent = 0.5 * (moved[..., 2] - steps[:, None, 2])
+        c, s = np.cos(bent), np.sin(bent)
+        x, y = c * moved[..., 0] - s * moved[..., 1], s * moved[..., 0] + c * moved[..., 1]
+        robot = compose_many(robot, np.stack((x, y, moved[..., 2]), axis=-1).reshape(-1, 3))
+        laser = compose_many(robot, np.tile(self.laser_pose, (len(robot), 1)))
+        laser[:, 2] += np.tile(geometry.angles(beams), last - first)
+        ahead = ScanGeometry(0.0, 1.0)
+        return raycast(self.plan.segments, laser, ahead, 1).reshape(last - first, beams)
 
     def _rng(self, *stream: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, *stream])

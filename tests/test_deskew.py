@@ -1,0 +1,91 @@
+"""Motion during a scan: a laser that spins sees its last beam from elsewhere than its first."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hsslam.config import load_config
+from hsslam.datasets.simulator import EXACT, DriveModel, SimulatedDataset, laser_model
+from hsslam.io.logs import read_log, write_log
+from hsslam.scan import LaserScan, ScanGeometry
+from hsslam.se2 import between, between_many, compose, inverse, pose, transform
+from hsslam.slam.pipeline import Slam
+
+TURNING = DriveModel(rate=10.0, speed=0.5, turn_rate=math.radians(60.0))
+
+
+@pytest.fixture(scope="module")
+def log() -> SimulatedDataset:
+    return SimulatedDataset("office", scans=260, laser="rplidar-a2", odometry=EXACT, motion=TURNING)
+
+
+def test_returns_are_moved_to_where_the_robot_of_the_stamp_sees_them() -> None:
+    """A post straight ahead of every beam's moment, seen by a robot that drives an arc."""
+    post, velocity, laser = np.array([[4.0, 1.0]]), pose(0.5, 0.0, 1.0), pose(0.2, -0.1, 0.3)
+    geometry = ScanGeometry(-3.0, 0.1, time_increment=0.01)
+    ranges = np.full(60, np.nan)
+    for beam, angle in enumerate(geometry.angles(60)):
+        turn = velocity[2] * 0.01 * beam
+        robot = pose(
+            0.5 * math.sin(turn), 0.5 * (1.0 - math.cos(turn)), turn
+        )  # a circle of radius v / w = 0.5
+        (seen,) = transform(inverse(compose(robot, laser)), post)
+        if abs(math.atan2(seen[1], seen[0]) - angle) < 0.05:
+            ranges[beam] = math.hypot(*seen)
+    scan = LaserScan(0.0, ranges, geometry, laser_pose=laser)
+    (moved,) = replace(scan, velocity=velocity).robot_points
+    (still,) = scan.robot_points
+    assert moved == pytest.approx(post[0], abs=0.25)  # beams are 0.1 rad apart
+    assert np.hypot(*(moved - post[0])) < 0.5 * np.hypot(*(still - post[0]))
+
+
+def test_at_rest_or_all_at_once_nothing_moves(log: SimulatedDataset) -> None:
+    scan = next(log.scans())
+    instant = replace(scan.geometry, time_increment=0.0)
+    assert (replace(scan, velocity=np.zeros(3)).robot_points == scan.points).all()
+    assert (replace(scan, geometry=instant, velocity=pose(1.0, 0.0, 1.0)).robot_points == scan.points).all()
+
+
+def test_a_sweep_begins_where_the_robot_is_and_ends_where_it_is_at_the_next_scan(
+    log: SimulatedDataset,
+) -> None:
+    exact = replace(
+        laser_model("rplidar-a2"), range_noise=0.0, range_noise_share=0.0, resolution=0.0, drop_out=0.0
+    )
+    swept = SimulatedDataset("office", scans=20, laser=exact, motion=TURNING)
+    frozen = SimulatedDataset("office", scans=20, laser=replace(exact, time_increment=0.0), motion=TURNING)
+    for a, b in zip(swept.scans(), frozen.scans(), strict=True):
+        assert a.ranges[0] == pytest.approx(b.ranges[0])
+    assert not np.allclose(a.ranges, b.ranges, atol=0.02)
+
+
+def test_tracking_is_the_better_for_it(log: SimulatedDataset) -> None:
+    errors = {}
+    for deskew in (False, True):
+        slam = Slam(load_config(overrides=[f"tracker.deskew={str(deskew).lower()}", "loops.enabled=false"]))
+        found = [slam.process(scan)[0].pose for scan in log.scans()]  # type: ignore[union-attr]
+        steps = between_many(np.array(found[:-10]), np.array(found[10:]))
+        truth = between_many(log.poses[:-10], log.poses[10:])
+        errors[deskew] = np.abs(
+            np.array([between(t, s)[2] for t, s in zip(truth, steps, strict=True)])
+        ).mean()
+    assert errors[True] < 0.7 * errors[False]
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("a.bag", "ros1"), ("a.mcap", "mcap"), ("a.csv", "csv"), ("a.npz", "npz")]
+)
+def test_logs_keep_the_time_from_beam_to_beam(
+    tmp_path: Path, log: SimulatedDataset, name: str, kind: str
+) -> None:
+    if kind in ("ros1", "mcap"):
+        pytest.importorskip("rosbags")
+    scans = [scan for scan, _ in zip(log.scans(), range(3), strict=False)]
+    write_log(tmp_path / name, scans, kind)
+    for back, scan in zip(read_log(tmp_path / name), scans, strict=True):
+        assert back.geometry.time_increment == pytest.approx(scan.geometry.time_increment, rel=1e-6)
