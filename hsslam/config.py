@@ -184,7 +184,9 @@ class GraphSection(Section):
         description="its standard deviation of heading per radian turned or metre driven (deg)",
     )
     refine_rounds: int = Field(
-        default=1, ge=0, description="rounds of matching overlapping keyframes again at the end"
+        default=1,
+        ge=0,
+        description="rounds of matching overlapping keyframes again at the end, at most: they end when nothing moves",
     )
     marginals: bool = Field(
         default=False,

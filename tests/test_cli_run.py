@@ -13,6 +13,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from hsslam.cli.main import app
+from hsslam.config import load_config
 from hsslam.slam.folder import FILES
 
 SCANS = 560  # enough of the office for the robot to have come back to where it was
@@ -174,3 +175,11 @@ def test_eval_of_a_peer_on_intel(shared_data: Path) -> None:
     assert result.exit_code == 0, result.output
     assert "0.0205 +- 0.0136 m, 0.530 " in result.stdout
     assert "CC-BY 3.0" in result.stdout
+
+
+def test_refine_says_how_often_overlapping_keyframes_are_matched_again(tmp_path: Path) -> None:
+    run = ("run", "corridor", "--scans", "40", "--quiet", "--out", tmp_path / "r")
+    assert hsslam(*run, "--refine", "0").exit_code == 0
+    assert load_config(tmp_path / "r" / "config.yaml").graph.refine_rounds == 0
+    refused = hsslam("run", "corridor", "--refine", "-1")
+    assert refused.exit_code == 2 and "--refine" in refused.output

@@ -246,3 +246,11 @@ def test_a_run_that_is_asked_for_marginals_has_them(office: SimulatedDataset) ->
     assert result.covariances is not None
     assert result.covariances.shape == (len(result.keyframes), 3, 3)
     assert (np.linalg.eigvalsh(result.covariances) > 0.0).all()
+
+
+def test_rounds_of_refinement_end_when_nothing_moves(office: SimulatedDataset) -> None:
+    slam = Slam(load_config(overrides=["graph.refine_rounds=30", "graph.rescan_keyframes=0"]))
+    events = slam.run(s for s in office.scans() if s.index < 150)
+    stages = [event.stage for event in events if isinstance(event, Optimised)]
+    assert stages[:2] == ["final", "refinement 1"]
+    assert len(stages) < 12

@@ -53,6 +53,14 @@ def run(
     config: ConfigFile = None,
     settings: Settings = None,
     seed: Seed = None,
+    refine: Annotated[
+        int | None,
+        typer.Option(
+            metavar="ROUNDS",
+            min=0,
+            help="Match overlapping keyframes again from the optimised poses, up to so often; one if left out.",
+        ),
+    ] = None,
     scans: Scans = None,
     scan_topic: ScanTopic = None,
     odom_topic: OdomTopic = None,
@@ -106,7 +114,7 @@ def run(
         loop_matcher=loop_matcher,
         seed=seed,
         presets=preset or (),
-        settings=settings or (),
+        settings=[*(settings or ()), *([] if refine is None else [f"graph.refine_rounds={refine}"])],
         base=died.config if died is not None else None,
     )
     topics = {"scan_topic": scan_topic, "odom_topic": odom_topic}

@@ -30,6 +30,9 @@ from hsslam.slam.tracker import TrackedScan, Tracker
 from hsslam.slam.verification import LoopVerifier
 from hsslam.trajectory import Trajectory
 
+AT_REST = 0.002
+"""Rounds of refinement end when they move keyframes by less than this on average (m), as the noise of matches does."""
+
 
 class Slam:
     """Simultaneous localisation and mapping, scan by scan.
@@ -129,6 +132,8 @@ class Slam:
                 for edge in edges:
                     graph.add_edge(edge)
             yield self._optimise(f"refinement {stage + 1}")
+            if float(np.hypot(*(graph.poses - poses)[:, :2].T).mean()) < AT_REST:
+                break
         if self._config.graph.rescan_keyframes:
             with self._stopwatch.measure("rescan"):
                 self._rescan(graph)
