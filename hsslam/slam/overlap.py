@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from hsslam.config import Config
 from hsslam.jit import kernel
 from hsslam.matching.interface import Matcher, Reference, SearchWindow
-from hsslam.se2 import Points, Poses, between, wrap
+from hsslam.se2 import Points, Poses, between, between_many, wrap
 from hsslam.slam.events import Edge
 from hsslam.slam.randomness import Purpose, generator
 
@@ -98,3 +98,15 @@ def match_pairs(
         if result.converged and result.score >= rules.overlap_min_score:
             edges.append(Edge(first, second, result.pose, result.covariance, "overlap"))
     return edges
+
+
+def moved(pairs: list[tuple[int, int]], before: Poses, after: Poses) -> float:
+    """Mean distance by which keyframes moved, seen from those that they overlap (m); 0 without pairs.
+
+    A turn of the whole map, which no constraint but the first keyframe's minds, is no motion.
+    """
+    if not pairs:
+        return 0.0
+    first, second = np.array(pairs).T
+    apart = between_many(before[first], before[second]) - between_many(after[first], after[second])
+    return float(np.hypot(apart[:, 0], apart[:, 1]).mean())

@@ -22,7 +22,7 @@ from hsslam.slam.events import (
 from hsslam.slam.graph import PoseGraph
 from hsslam.slam.journal import Replay
 from hsslam.slam.loops import LoopCloser
-from hsslam.slam.overlap import match_pairs, overlapping_pairs
+from hsslam.slam.overlap import match_pairs, moved, overlapping_pairs
 from hsslam.slam.rescan import match_scans, smooth
 from hsslam.slam.scan_table import ScanTable
 from hsslam.slam.stopwatch import Stopwatch
@@ -30,8 +30,8 @@ from hsslam.slam.tracker import TrackedScan, Tracker
 from hsslam.slam.verification import LoopVerifier
 from hsslam.trajectory import Trajectory
 
-AT_REST = 0.002
-"""Rounds of refinement end when they move keyframes by less than this on average (m), as the noise of matches does."""
+AT_REST = 0.001
+"""Rounds of refinement end when they move keyframes that overlap by less than this on average (m)."""
 
 
 class Slam:
@@ -132,7 +132,7 @@ class Slam:
                 for edge in edges:
                     graph.add_edge(edge)
             yield self._optimise(f"refinement {stage + 1}")
-            if float(np.hypot(*(graph.poses - poses)[:, :2].T).mean()) < AT_REST:
+            if moved(pairs, poses, graph.poses) < AT_REST:
                 break
         if self._config.graph.rescan_keyframes:
             with self._stopwatch.measure("rescan"):
