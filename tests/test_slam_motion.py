@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hsslam.config import Config, GraphSection
+from hsslam.config import Config, GraphSection, load_config
 from hsslam.datasets.simulator import SimulatedDataset
 from hsslam.scan import LaserScan, ScanGeometry
 from hsslam.se2 import between_many, compose, pose
@@ -98,6 +98,24 @@ def test_slam_goes_on_without_odometry(first: int, last: int) -> None:
 
     result = Slam(Config()).solve(scans())
     assert largest_error(result.trajectory.poses, office.poses) < 0.10
+
+
+@pytest.mark.parametrize(("frozen", "first"), [(True, 30), (False, None)])
+def test_poses_that_nothing_told_of_are_counted(frozen: bool, first: int | None) -> None:
+    """Blind for twenty scans: with odometry that is no guess, without it is."""
+    office = SimulatedDataset("office", seed=4, scans=60)
+    blind = range(30, 50)
+    scans = [
+        replace(
+            scan,
+            ranges=np.full_like(scan.ranges, np.inf) if scan.index in blind else scan.ranges,
+            odometry=np.zeros(3) if frozen else scan.odometry,
+        )
+        for scan in office.scans()
+    ]
+    told = Slam(load_config(overrides=["loops.enabled=false"])).solve(scans).statistics
+    assert told["first_guessed"] == first
+    assert told["guessed"] >= len(blind) if frozen else told["guessed"] == 0
 
 
 def test_stamps_that_repeat_do_no_harm() -> None:

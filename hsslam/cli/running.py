@@ -79,6 +79,7 @@ def summary(
     return [
         ("dataset", f"{log.info.name}: {metrics['scans']:,} scans, {duration:,.0f} s of driving"),
         ("matcher", f"{metrics['matcher']}: {metrics['matched']:,} of {metrics['scans']:,} scans matched"),
+        *([("lost", lost)] if (lost := _lost(metrics)) else []),
         ("wall time", f"{timings['wall_s']:.1f} s ({timings['real_time_factor']:.0f} times real time)"),
         ("keyframes", f"{metrics['keyframes']:,}"),
         ("loops", f"{metrics['loops_accepted']:,} accepted of {metrics['loops_tried']:,} tried"),
@@ -87,6 +88,17 @@ def summary(
         *accuracy.rows(metrics),
         ("output", f"{folder.path}/"),
     ]
+
+
+def _lost(metrics: dict[str, Any]) -> str:
+    """What is to be said of scans whose pose is a guess; nothing where there is none."""
+    told = metrics["statistics"]
+    if not told["guessed"]:
+        return ""
+    return (
+        f"{told['guessed']:,} scans (the first: {told['first_guessed']:,}) neither matched nor told of by "
+        "odometry: the last motion was taken to go on, which is a guess"
+    )
 
 
 def _count(log: Dataset, shown: Progress) -> int | None:

@@ -117,6 +117,9 @@ class SlamResult:
         Every loop candidate tried.
     matched : int
         Scans whose pose came from a match, not from odometry.
+    statistics : dict
+        ``evaluations`` of all matches in tracking and loops; ``guessed``, of how many scans neither a match nor
+        odometry told the pose; ``first_guessed``, the first of them, or None.
     seconds : dict
         Wall time by stage (s), such as ``track``, ``submap``, ``loops``, ``graph``, ``final``, ``rescan``.
     covariances : float64 (K, 3, 3), optional

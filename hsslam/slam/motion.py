@@ -53,6 +53,10 @@ class MotionModel:
         """Whether odometry has stopped telling of motion."""
         return self._silent >= SILENT_AFTER
 
+    def still(self, scan: LaserScan) -> bool:
+        """Whether odometry says the same of a scan as of the last."""
+        return bool((scan.odometry == self._odometry).all())
+
     def start(self, scan: LaserScan) -> None:
         """Begin with the first scan."""
         self._odometry, self._stamp = scan.odometry, scan.stamp
@@ -79,8 +83,7 @@ class MotionModel:
 
     def observe(self, scan: LaserScan, motion: Pose) -> None:
         """Take note of what the match of a scan said about the motion since the last."""
-        still = bool((scan.odometry == self._odometry).all())
-        if not still:
+        if not self.still(scan):
             self._silent = 0
         elif math.hypot(motion[0], motion[1]) + abs(motion[2]) > MOVING:
             self._silent += 1

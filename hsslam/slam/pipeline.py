@@ -67,6 +67,8 @@ class Slam:
         self._scans = ScanTable()
         self._matched = 0
         self._evaluations = 0
+        self._guessed = 0
+        self._first_guessed: int | None = None
 
     def run(self, scans: Iterable[LaserScan]) -> Iterator[Event]:
         """Process every scan of a log, then finish."""
@@ -175,7 +177,11 @@ class Slam:
             loops=self._loops,
             matched=self._matched,
             seconds=dict(self._stopwatch.seconds),
-            statistics={"evaluations": self._evaluations},
+            statistics={
+                "evaluations": self._evaluations,
+                "guessed": self._guessed,
+                "first_guessed": self._first_guessed,
+            },
             covariances=graph.marginal_covariances() if self._config.graph.marginals else None,
         )
 
@@ -235,6 +241,9 @@ class Slam:
             scan.robot_points,
         )
         self._matched += tracked.matched
+        if self._tracker.guessed:
+            self._first_guessed = scan.index if not self._guessed else self._first_guessed
+            self._guessed += 1
         self._evaluations += tracked.evaluations
         return Tracked(
             scan=scan.index,

@@ -72,6 +72,9 @@ class Tracker:
         self.noise: NDArray[np.float64] = np.eye(3)
         """Its covariance (3, 3), in the frame of the last scan."""
 
+        self.guessed = False
+        """Whether nothing told of the last scan's pose: no match was believed, and odometry had not changed."""
+
     def start(self, scan: LaserScan, points: Points) -> None:
         """Begin with the first scan, the first keyframe."""
         self._motion.start(scan)
@@ -102,6 +105,7 @@ class Tracker:
         self.motion, self.noise = moved, rotated(noise, predicted[2])
         newest = self._submap.newest
         pose, posterior = compose(newest, tracked.relative), rotated(tracked.covariance, -newest[2])
+        self.guessed = not tracked.matched and self._motion.still(scan)
         self._motion.observe(scan, between(self._pose, pose))
         self._pose, self._covariance = pose, posterior
         return tracked
