@@ -193,10 +193,10 @@ class GraphSection(Section):
         description="work out at the end how well every keyframe's pose is known (covariances.csv)",
     )
     overlap_radius: float = Field(
-        default=3.0, gt=0.0, description="keyframes within this distance may overlap (m)"
+        default=5.0, gt=0.0, description="keyframes within this distance may overlap (m)"
     )
     overlap_neighbours: int = Field(
-        default=6, ge=1, description="overlapping keyframes matched with each, at most"
+        default=8, ge=1, description="overlapping keyframes matched with each, at most"
     )
     overlap_half_xy: float = Field(
         default=0.15, gt=0.0, description="half side of the window of such a match (m)"

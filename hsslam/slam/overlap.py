@@ -19,14 +19,14 @@ from hsslam.se2 import Points, Poses, between, between_many, wrap
 from hsslam.slam.events import Edge
 from hsslam.slam.randomness import Purpose, generator
 
-SPREAD = 3
+SPREAD = 2
 """Keyframes between two that are matched with the same third, at least: neighbours in time tell the same."""
 
 
 def overlapping_pairs(poses: Poses, radius: float, neighbours: int) -> list[tuple[int, int]]:
     """Pairs ``first < second`` of keyframes within ``radius`` (m): up to ``neighbours`` earlier ones of each.
 
-    The nearest come first; of keyframes that follow one another only every third is taken, so that all visits
+    The nearest come first; of keyframes that follow one another only every other is taken, so that all visits
     to a place are tied together. Consecutive keyframes are no pair: they have a constraint.
     """
     pairs = nearest_apart(poses, radius, neighbours, SPREAD)
