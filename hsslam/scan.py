@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,13 @@ class ScanGeometry:
     def angles(self, beams: int) -> NDArray[np.float64]:
         """Angles (rad) of the first ``beams`` beams, (beams,)."""
         return self.angle_min + self.angle_increment * np.arange(beams, dtype=np.float64)
+
+
+@lru_cache(maxsize=16)
+def _directions(geometry: ScanGeometry, beams: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Cosines and sines of the beams' angles, which a log's scans have in common."""
+    angles = geometry.angles(beams)
+    return np.cos(angles), np.sin(angles)
 
 
 def _origin() -> Pose:
@@ -90,8 +97,11 @@ class LaserScan:
         """Returns in the laser's frame in beam order, (N, 2) m."""
         valid = self.valid
         r = self.ranges[valid]
-        angles = self.geometry.angles(len(self.ranges))[valid]
-        return np.column_stack((r * np.cos(angles), r * np.sin(angles)))
+        cosines, sines = _directions(self.geometry, len(self.ranges))
+        points = np.empty((len(r), 2))
+        np.multiply(r, cosines[valid], out=points[:, 0])
+        np.multiply(r, sines[valid], out=points[:, 1])
+        return points
 
     @cached_property
     def robot_points(self) -> Points:
