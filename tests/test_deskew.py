@@ -8,10 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hsslam.config import load_config
 from hsslam.datasets.simulator import EXACT, DriveModel, SimulatedDataset, laser_model
 from hsslam.io.logs import read_log, write_log
+from hsslam.mapping.occupancy import build_grid
 from hsslam.scan import LaserScan, ScanGeometry
 from hsslam.se2 import between, between_many, compose, inverse, pose, transform
 from hsslam.slam.pipeline import Slam
@@ -89,3 +92,35 @@ def test_logs_keep_the_time_from_beam_to_beam(
     write_log(tmp_path / name, scans, kind)
     for back, scan in zip(read_log(tmp_path / name), scans, strict=True):
         assert back.geometry.time_increment == pytest.approx(scan.geometry.time_increment, rel=1e-6)
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    velocity=st.tuples(*[st.floats(-2.0, 2.0)] * 3),
+    mounting=st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-3.0, 3.0)),
+)
+def test_the_map_has_walls_where_the_returns_are(
+    velocity: tuple[float, float, float], mounting: tuple[float, float, float]
+) -> None:
+    geometry = ScanGeometry(-3.0, 0.06, time_increment=0.002)
+    ranges = np.linspace(1.0, 4.0, 100)
+    scan = LaserScan(0.0, ranges, geometry, laser_pose=pose(*mounting), velocity=pose(*velocity))
+    at = pose(0.3, -0.2, 0.7)
+    grid = build_grid([scan], at[None], 0.05)
+    places = transform(at, scan.robot_points)
+    columns, rows = np.floor((places - grid.origin) / 0.05).astype(int).T
+    # A place on the edge of two cells may be rounded into either.
+    seen = np.count_nonzero(grid.log_odds[rows, columns] > 0.0)
+    assert seen >= 98
+    assert np.count_nonzero(grid.log_odds > 0.0) <= 100
+
+
+def test_a_map_is_the_sharper_for_it(log: SimulatedDataset) -> None:
+    scans = list(log.scans())[:-1]
+    steps = between_many(log.poses[:-1], log.poses[1:])
+    seconds = np.diff([scan.stamp for scan in log.scans()])
+    moving = [
+        replace(scan, velocity=step / time) for scan, step, time in zip(scans, steps, seconds, strict=True)
+    ]
+    occupied = [np.count_nonzero(build_grid(kind, log.poses[:-1]).log_odds > 0.0) for kind in (moving, scans)]
+    assert occupied[0] < 0.9 * occupied[1]

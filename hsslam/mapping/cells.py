@@ -18,8 +18,11 @@ SLACK = 128
 
 _BLOCK = 512
 
-Block: TypeAlias = tuple[NDArray[np.float64], Poses, NDArray[np.float64], NDArray[np.float64], float, float]
-"""Scans alike in geometry: ranges (N, B), laser poses (N, 3), cosines and sines (B,) of the beams, range limits."""
+Block: TypeAlias = tuple[
+    NDArray[np.float64], Poses, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float, float
+]
+"""Scans alike in geometry: ranges (N, B), laser poses (N, 3) and their steps from beam to beam (N, 3), cosines and
+sines (B,) of the beams, range limits."""
 
 
 class CellCounts:
@@ -69,7 +72,7 @@ class CellCounts:
             self._last_hit.fill(-1)
             first = 0
         self._scans = first + scans
-        ranges, poses, cosine, sine, range_min, range_max = block
+        ranges, poses, steps, cosine, sine, range_min, range_max = block
         count(
             self._hits,
             self._misses,
@@ -81,6 +84,7 @@ class CellCounts:
             sign,
             ranges,
             poses,
+            steps,
             cosine,
             sine,
             range_min,
@@ -107,10 +111,22 @@ def blocks(scans: Sequence[LaserScan], poses: Poses) -> Iterator[Block]:
         for start in range(0, len(alike), _BLOCK):
             part = alike[start : start + _BLOCK]
             robot = poses[first : first + len(part)]
-            laser = compose_many(robot, np.array([scan.laser_pose for scan in part], dtype=np.float64))
+            mounted = np.array([scan.laser_pose for scan in part], dtype=np.float64)
+            laser = compose_many(robot, mounted)
+            velocities = np.array([scan.velocity for scan in part], dtype=np.float64)
+            steps = geometry.time_increment * _seen_from_laser(velocities, mounted)
             ranges = np.array([scan.ranges for scan in part], dtype=np.float64).reshape(len(part), beams)
-            yield ranges, laser, cosine, sine, float(geometry.range_min), float(geometry.range_max)
+            limits = float(geometry.range_min), float(geometry.range_max)
+            yield ranges, laser, steps, cosine, sine, *limits
             first += len(part)
+
+
+def _seen_from_laser(velocities: NDArray[np.float64], mounted: Poses) -> NDArray[np.float64]:
+    """Velocities (N, 3) of lasers in their own frames, from those of the robots that they are mounted on."""
+    c, s = np.cos(mounted[:, 2]), np.sin(mounted[:, 2])
+    x = velocities[:, 0] - velocities[:, 2] * mounted[:, 1]
+    y = velocities[:, 1] + velocities[:, 2] * mounted[:, 0]
+    return np.column_stack((c * x + s * y, c * y - s * x, velocities[:, 2]))
 
 
 def _kind(scan: LaserScan) -> tuple[ScanGeometry, int]:
