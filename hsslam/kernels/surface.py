@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from hsslam.jit import kernel
 from hsslam.kernels.growth import make_room
+from hsslam.kernels.lines import fit_line, noise_of
 from hsslam.se2 import Points
 
 GAP = 0.35
 """Neighbouring returns further apart than this (m) are not joined."""
 
 FIT_SPAN = 0.15
-"""A line is fitted to the returns within this stretch of surface around a segment (m)."""
+"""A line is fitted to the returns within this stretch of surface around a segment (m), or more if they are noisy."""
 
 FIT_ROUGHNESS = 0.03
 """Where the returns stray further from the fitted line than this (m, rms) there is a corner: no smoothing."""
@@ -129,6 +130,7 @@ def join(
     pieces = np.empty((n, 8))
     tilts = np.empty(n)
     line = np.empty(5)
+    noise = noise_of(points, gap)
     count = 0
     joined_before = False
     for i in range(n):
@@ -139,7 +141,7 @@ def join(
             dy = points[i + 1, 1] - points[i, 1]
             joined = dx * dx + dy * dy <= gap * gap
         if joined:
-            fit_line(points, i, gap, span, roughness, line)
+            fit_line(points, i, gap, span, roughness, noise, line)
             length = math.sqrt(dx * dx + dy * dy)
         elif not joined_before:
             line[:] = 0.0
@@ -168,6 +170,7 @@ def lines_of(points: Points, gap: float, span: float, roughness: float) -> NDArr
     n = points.shape[0]
     lines = np.empty((n, 3))
     line = np.zeros(5)
+    noise = noise_of(points, gap)
     joined_before = False
     for i in range(n):
         joined = False
@@ -176,75 +179,13 @@ def lines_of(points: Points, gap: float, span: float, roughness: float) -> NDArr
             dy = points[i + 1, 1] - points[i, 1]
             joined = dx * dx + dy * dy <= gap * gap
         if joined:
-            fit_line(points, i, gap, span, roughness, line)
+            fit_line(points, i, gap, span, roughness, noise, line)
         elif not joined_before:
             line[:] = 0.0
         lines[i, 0], lines[i, 1] = line[2], line[3]
         lines[i, 2] = line[2] * line[0] + line[3] * line[1]
         joined_before = joined
     return lines
-
-
-@kernel
-def fit_line(
-    points: Points, i: int, gap: float, span: float, roughness: float, out: NDArray[np.float64]
-) -> None:
-    """Fit a line to the points around segment ``i``, ``i + 1``; into ``out`` (5,): point, normal, tilt.
-
-    The stretch grows by a point at each end in turn while it stays connected and within half of ``span`` of
-    the segment's middle; with too rough a fit the segment itself is the line.
-    """
-    n = points.shape[0]
-    mx = 0.5 * (points[i, 0] + points[i + 1, 0])
-    my = 0.5 * (points[i, 1] + points[i + 1, 1])
-    limit = 0.25 * span * span
-    first, last = i, i + 1
-    for step in (-1, 1):
-        j = i if step < 0 else i + 1
-        while 0 <= j + step < n:
-            k = j + step
-            gx, gy = points[k, 0] - points[j, 0], points[k, 1] - points[j, 1]
-            rx, ry = points[k, 0] - mx, points[k, 1] - my
-            if gx * gx + gy * gy > gap * gap or rx * rx + ry * ry > limit:
-                break
-            j = k
-        if step < 0:
-            first = j
-        else:
-            last = j
-    count = last - first + 1
-    if count > 2:
-        cx = cy = 0.0
-        for j in range(first, last + 1):
-            cx += points[j, 0]
-            cy += points[j, 1]
-        cx /= count
-        cy /= count
-        xx = xy = yy = 0.0
-        for j in range(first, last + 1):
-            dx, dy = points[j, 0] - cx, points[j, 1] - cy
-            xx += dx * dx
-            xy += dx * dy
-            yy += dy * dy
-        half_trace = 0.5 * (xx + yy)
-        root = math.sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy)
-        if half_trace - root <= roughness * roughness * count and root > 0.0:
-            # The long axis of the scatter, in the form that does not cancel.
-            across = 0.5 * (xx - yy)
-            ux, uy = (across + root, xy) if across > 0.0 else (xy, root - across)
-            length = math.sqrt(ux * ux + uy * uy)
-            out[0], out[1] = cx, cy
-            out[2], out[3] = -uy / length, ux / length
-            out[4] = 1.0 / (half_trace + root)
-            return
-    dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
-    length = math.sqrt(dx * dx + dy * dy)
-    out[0], out[1] = mx, my
-    if length > 0.0:
-        out[2], out[3] = -dy / length, dx / length
-        out[4] = 2.0 / (length * length)
-    else:
-        out[2], out[3], out[4] = 0.0, 0.0, 0.0
 
 
 @kernel

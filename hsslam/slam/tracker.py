@@ -136,7 +136,7 @@ class Tracker:
         window = foreseen_window(max(prior[0, 0], prior[1, 1]), prior[2, 2], self._window, self._widest)
         with self._stopwatch.measure("track"):
             result = match_within(self._matcher, reference, points, predicted, window, self._window, rng)
-        if _at_edge(result.pose, predicted, window):
+        if _at_edge(result, predicted, window):
             with self._stopwatch.measure("recover"):
                 result = self._look_further(reference, points, predicted, result, rng)
         if not result.converged or result.score < rules.recovery_score:
@@ -182,7 +182,11 @@ class Tracker:
         return replace(best if better else first, evaluations=evaluations)
 
 
-def _at_edge(pose: Pose, middle: Pose, window: SearchWindow) -> bool:
-    off = pose - middle
+def _at_edge(result: MatchResult, middle: Pose, window: SearchWindow) -> bool:
+    off = result.pose - middle
     off[2] = wrap(off[2])
+    direction = result.diagnostics.get("degenerate_direction")
+    if direction is not None:  # along it every answer is as good, the edge's too
+        along = np.array([math.cos(direction), math.sin(direction), 0.0])
+        off -= (off @ along) * along
     return bool((np.abs(off) > EDGE * window.half).any())

@@ -1,0 +1,176 @@
+"""Lines through neighbouring returns, over as much of a surface as the returns' noise calls for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam.jit import kernel
+from hsslam.se2 import Points
+
+ARM = 0.15
+"""Noise is told from a return's distance from a chord that ends this far from it on either side (m)."""
+
+LONG = 0.2
+"""Noise over the length of a chord's arm, at most: else the arm is too short to tell."""
+
+MEDIAN = 0.6745
+"""Median of the absolute value of a normal variate of standard deviation 1."""
+
+ENOUGH = 5
+"""Chords that tell of noise, at least."""
+
+STEADY = 0.12
+"""Standard deviation (rad) of a line's direction, up to which no more returns are needed."""
+
+WIDENINGS = 3
+"""How often the stretch of surface may be doubled."""
+
+SAME = 1.5
+"""Returns of a plain surface stray from its line by no more than this many standard deviations of the noise (rms)."""
+
+
+VAGUE = 0.35
+"""Standard deviation (rad) of a line's direction, from which on it points nowhere."""
+
+
+@kernel
+def noise_of(points: Points, gap: float) -> float:
+    """Standard deviation (m) of returns across the surface that they lie on, from the returns themselves.
+
+    The median over all returns of their distances from chords to either side, as it would be on plain surfaces: what
+    corners and edges add are outliers to it. 0 where too few returns have neighbours to tell.
+    """
+    noise = _noise_about_chords(points, gap, ARM)
+    if noise > LONG * ARM:
+        # Returns that noise took far away end chords that are too short for it.
+        return min(noise, _noise_about_chords(points, gap, noise / LONG))
+    return noise
+
+
+@kernel
+def _noise_about_chords(points: Points, gap: float, arm: float) -> float:
+    """As `noise_of`, with chords of a given length to either side (m)."""
+    n = points.shape[0]
+    found = np.empty(n)
+    count = 0
+    for i in range(1, n - 1):
+        a = _end_of_arm(points, i, -1, gap, arm)
+        b = _end_of_arm(points, i, 1, gap, arm)
+        dx, dy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
+        squared = dx * dx + dy * dy
+        if a == i or b == i or squared < arm * arm:
+            continue
+        px, py = points[i, 0] - points[a, 0], points[i, 1] - points[a, 1]
+        t = (px * dx + py * dy) / squared
+        if 0.1 < t < 0.9:
+            # The chord's ends are as noisy as the return.
+            found[count] = abs(px * dy - py * dx) / math.sqrt(squared * (1.0 + t * t + (1.0 - t) * (1.0 - t)))
+            count += 1
+    if count < ENOUGH:
+        return 0.0
+    return float(np.median(found[:count])) / MEDIAN
+
+
+@kernel
+def _end_of_arm(points: Points, i: int, step: int, gap: float, arm: float) -> int:
+    """The first return ``arm`` (m) from return ``i`` along the surface, or the last before the surface ends."""
+    j = i
+    while 0 <= j + step < points.shape[0]:
+        k = j + step
+        gx, gy = points[k, 0] - points[j, 0], points[k, 1] - points[j, 1]
+        if gx * gx + gy * gy > gap * gap:
+            break
+        j = k
+        rx, ry = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
+        if rx * rx + ry * ry > arm * arm:
+            break
+    return j
+
+
+@kernel
+def fit_line(
+    points: Points,
+    i: int,
+    gap: float,
+    span: float,
+    roughness: float,
+    noise: float,
+    out: NDArray[np.float64],
+) -> None:
+    """Fit a line to the points around segment ``i``, ``i + 1``; into ``out`` (5,): point, normal, tilt.
+
+    The stretch grows by a point at each end in turn while it stays connected and within half of ``span`` of the
+    segment's middle. It is doubled while ``noise`` leaves the line's direction uncertain and the points are as near to
+    the line as noise alone would have them. With too rough a fit the segment itself is the line.
+    """
+    dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
+    length = math.sqrt(dx * dx + dy * dy)
+    out[0], out[1] = 0.5 * (points[i, 0] + points[i + 1, 0]), 0.5 * (points[i, 1] + points[i + 1, 1])
+    if length > 0.0:
+        out[2], out[3] = -dy / length, dx / length
+        out[4] = 2.0 / (length * length)
+    else:
+        out[2], out[3], out[4] = 0.0, 0.0, 0.0
+    strays = max(roughness, SAME * noise)
+    for _ in range(WIDENINGS + 1):
+        _fit_within(points, i, gap, span, strays, out)
+        if noise * noise * out[4] <= STEADY * STEADY:
+            return
+        span *= 2.0
+        strays = SAME * noise
+    if noise * noise * out[4] > VAGUE * VAGUE:
+        out[2], out[3], out[4] = 0.0, 0.0, 0.0
+
+
+@kernel
+def _fit_within(
+    points: Points, i: int, gap: float, span: float, roughness: float, out: NDArray[np.float64]
+) -> None:
+    """Fit a line to the points within a stretch, unless they stray from it or are not more than the segment's two."""
+    n = points.shape[0]
+    mx = 0.5 * (points[i, 0] + points[i + 1, 0])
+    my = 0.5 * (points[i, 1] + points[i + 1, 1])
+    limit = 0.25 * span * span
+    first, last = i, i + 1
+    for step in (-1, 1):
+        j = i if step < 0 else i + 1
+        while 0 <= j + step < n:
+            k = j + step
+            gx, gy = points[k, 0] - points[j, 0], points[k, 1] - points[j, 1]
+            rx, ry = points[k, 0] - mx, points[k, 1] - my
+            if gx * gx + gy * gy > gap * gap or rx * rx + ry * ry > limit:
+                break
+            j = k
+        if step < 0:
+            first = j
+        else:
+            last = j
+    count = last - first + 1
+    if count <= 2:
+        return
+    cx = cy = 0.0
+    for j in range(first, last + 1):
+        cx += points[j, 0]
+        cy += points[j, 1]
+    cx /= count
+    cy /= count
+    xx = xy = yy = 0.0
+    for j in range(first, last + 1):
+        dx, dy = points[j, 0] - cx, points[j, 1] - cy
+        xx += dx * dx
+        xy += dx * dy
+        yy += dy * dy
+    half_trace = 0.5 * (xx + yy)
+    root = math.sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy)
+    if half_trace - root > roughness * roughness * count or root == 0.0:
+        return
+    # The long axis of the scatter, in the form that does not cancel.
+    across = 0.5 * (xx - yy)
+    ux, uy = (across + root, xy) if across > 0.0 else (xy, root - across)
+    length = math.sqrt(ux * ux + uy * uy)
+    out[0], out[1] = cx, cy
+    out[2], out[3] = -uy / length, ux / length
+    out[4] = 1.0 / (half_trace + root)

@@ -1,0 +1,94 @@
+"""Lasers whose noise is larger than a piece of wall between two returns is long."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hsslam.config import load_config
+from hsslam.datasets.simulator import (
+    DriveModel,
+    FloorPlan,
+    LaserModel,
+    OdometryModel,
+    SimulatedDataset,
+)
+from hsslam.datasets.simulator.solids import room
+from hsslam.kernels.lines import noise_of
+from hsslam.kernels.surface import GAP, Surface
+from hsslam.se2 import Points, between_many
+from hsslam.slam.pipeline import Slam
+
+
+def wall(noise: float, spacing: float = 0.05, seed: int = 0) -> Points:
+    x = np.arange(0.0, 5.0, spacing)
+    return np.column_stack((x, np.random.default_rng(seed).normal(0.0, noise, len(x))))
+
+
+def with_corner(noise: float) -> Points:
+    """A wall along x from 0 to 5, then one along y."""
+    along, up = wall(noise), wall(noise, seed=1)
+    return np.vstack((along, np.column_stack((5.0 + up[:, 1], up[:, 0]))))
+
+
+def tilts(points: Points) -> NDArray[np.float64]:
+    """Angles (rad) between the lines and the wall, of those pieces that have a line."""
+    normals = Surface.build(points).pieces[:, 5:7]
+    normals = normals[np.abs(normals).sum(axis=1) > 0.0]
+    return np.arctan2(np.abs(normals[:, 0]), np.abs(normals[:, 1]))
+
+
+@pytest.mark.parametrize("noise", [0.005, 0.02, 0.05, 0.08])
+@pytest.mark.parametrize("spacing", [0.02, 0.05, 0.12])
+def test_noise_is_told_from_the_returns(noise: float, spacing: float) -> None:
+    assert noise_of(wall(noise, spacing), GAP) == pytest.approx(noise, rel=0.5)
+
+
+def test_corners_are_no_noise() -> None:
+    assert noise_of(with_corner(0.005), GAP) < 0.01
+
+
+def test_too_few_returns_tell_of_no_noise() -> None:
+    assert noise_of(wall(0.05)[:4], GAP) == 0.0
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.08])
+def test_lines_through_noisy_returns_follow_the_wall(noise: float) -> None:
+    assert np.quantile(tilts(wall(noise)), 0.9) < 0.25
+
+
+def test_lines_of_noisy_returns_that_are_too_few_point_nowhere() -> None:
+    pair = np.array([[0.0, 20.0], [0.2, 20.05]])
+    surface = Surface.build(np.vstack((wall(0.08), pair)))
+    assert (surface.pieces[-1, 5:7] == 0.0).all()
+
+
+def test_a_quiet_laser_sees_corners_as_sharp_as_ever() -> None:
+    normals = Surface.build(with_corner(0.003)).pieces[:, 5:7]
+    oblique = np.minimum(np.abs(normals[:, 0]), np.abs(normals[:, 1])) > 0.3
+    assert oblique.sum() <= 3
+
+
+def test_along_a_bare_wall_a_noisy_laser_does_not_lead_the_robot_astray() -> None:
+    plan = FloorPlan(
+        "bare", "bare", tuple(room(0.0, 0.0, 60.0, 40.0)), np.array([[8.0, 6.0], [50.0, 6.0], [50.0, 30.0]])
+    )
+    cheap = LaserModel(
+        "cheap", 360, -math.pi, math.radians(1.0), 0.15, 10.0, 0.05, 0.0, 0.005, 0.03, math.inf
+    )
+    log = SimulatedDataset(
+        plan,
+        scans=240,
+        laser=cheap,
+        odometry=OdometryModel(),
+        motion=DriveModel(rate=5.0, speed=0.6, turn_rate=math.radians(50.0)),
+    )
+    online = Slam(load_config(overrides=["graph.rescan_keyframes=0"])).solve(log.scans()).online.poses
+    error = between_many(
+        between_many(log.poses[:1].repeat(240, axis=0), log.poses),
+        between_many(online[:1].repeat(240, axis=0), online),
+    )
+    assert np.hypot(error[:, 0], error[:, 1]).max() < 0.6
