@@ -136,7 +136,7 @@ class Tracker:
         window = foreseen_window(max(prior[0, 0], prior[1, 1]), prior[2, 2], self._window, self._widest)
         with self._stopwatch.measure("track"):
             result = match_within(self._matcher, reference, points, predicted, window, self._window, rng)
-        if _at_edge(result, predicted, window):
+        if self._cut_off(result, predicted, window):
             with self._stopwatch.measure("recover"):
                 result = self._look_further(reference, points, predicted, result, rng)
         if not result.converged or result.score < rules.recovery_score:
@@ -153,6 +153,17 @@ class Tracker:
         return TrackedScan(
             between(newest, pose), rotated(covariance, newest[2]), result.score, matched, result.evaluations
         )
+
+    def _cut_off(self, result: MatchResult, predicted: Pose, window: SearchWindow) -> bool:
+        """Whether a better answer may lie beyond the edge of the window around the prediction."""
+        off = result.pose - predicted
+        off[2] = wrap(off[2])
+        direction = result.diagnostics.get("degenerate_direction")
+        if direction is not None and result.score >= self._config.keyframes.min_score:
+            # All places along it are as good, those at the edge too: a bare wall's are, if the scan fits it.
+            along = np.array([math.cos(direction), math.sin(direction), 0.0])
+            off -= (off @ along) * along
+        return _at_edge(off, window)
 
     def _look_further(
         self,
@@ -182,11 +193,5 @@ class Tracker:
         return replace(best if better else first, evaluations=evaluations)
 
 
-def _at_edge(result: MatchResult, middle: Pose, window: SearchWindow) -> bool:
-    off = result.pose - middle
-    off[2] = wrap(off[2])
-    direction = result.diagnostics.get("degenerate_direction")
-    if direction is not None:  # along it every answer is as good, the edge's too
-        along = np.array([math.cos(direction), math.sin(direction), 0.0])
-        off -= (off @ along) * along
+def _at_edge(off: Pose, window: SearchWindow) -> bool:
     return bool((np.abs(off) > EDGE * window.half).any())
