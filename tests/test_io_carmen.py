@@ -200,7 +200,7 @@ def test_malformed_line_can_be_skipped_and_is_counted(tmp_path: Path, line: byte
 
 
 def test_malformed_line_far_down_keeps_its_number(tmp_path: Path) -> None:
-    log = write(tmp_path / "bad.clf", *[FLASER] * (LOOK_AHEAD + 5), b"FLASER 2 1\n")
+    log = write(tmp_path / "bad.clf", *[FLASER] * (LOOK_AHEAD + 5), b"FLASER 2 1\n", FLASER)
     with pytest.raises(DataError, match=rf"bad\.clf:{LOOK_AHEAD + 6}: "):
         list(read_carmen(log))
 

@@ -27,10 +27,12 @@ Conventions
   counter-clockwise: step 1 degree for 180 and 181 beams, 0.5 for 360 and 361. 180 and 360 lack the last beam:
   they end at +89 and +89.5. The SICK's narrow modes start at -50 degrees: step 1, 0.5, 0.25 degree for
   100/101, 200/201, 400/401 beams. Any other count is centred with the step (degrees) that
-  ``PARAM laser_front_laser_resolution`` gives, or spread over -90..+90.
+  ``PARAM laser_front_laser_resolution`` gives; without it 540/541 and 1080/1081 beams start at -135 degrees (step
+  0.5, 0.25), 682/683 at -120 (1024 to the turn), and the rest are spread over -90..+90.
 - A reading that is no return reads as the laser's maximum (81.83, 81.91, ...), and stays in ``ranges``;
   ``geometry.range_max`` makes it invalid. It is 80 m for FLASER and the like, or what
-  ``PARAM robot_front_laser_max`` says if that is less; for messages with a geometry it is their
+  ``PARAM robot_front_laser_max`` says if that is less, or the largest reading of the first scans where it is there far
+  more often than any other (8.19, 29.9, 50), until a scan reads more; for messages with a geometry it is their
   ``maximum_range``, where one from 80 to 82 m (a SICK's code, not its reach) or of 0 counts as 80 m.
 - ``odometry`` is always the robot's pose. In FLASER it is the second pose of the line; the first is that of
   the laser (or, in corrected logs, the corrected one) and is not used: ``laser_pose`` comes from ``PARAM
@@ -38,7 +40,8 @@ Conventions
   laser's from ``robot_rearlaser_offset`` and faces backwards. In ROBOTLASER it is the line's first pose seen
   from its second.
 - ``stamp`` is ``ipc_timestamp``. Loggers write in bursts: stamps may step back. The order is that of the
-  lines.
+  lines. ``FLASER`` and the like may lack the host and the logger's stamp, or all stamps: then these are 0, 1, 2...
+- A last line that is cut off is left out and counted.
 """
 
 from __future__ import annotations
@@ -50,12 +53,16 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hsslam.errors import DataError
 from hsslam.io import carmen_messages as messages
 from hsslam.io.carmen_messages import Laser, LogState, MalformedError
 from hsslam.io.carmen_writer import CarmenWriter
 from hsslam.io.compressed import read_lines
 from hsslam.io.log_statistics import LogStatistics
+from hsslam.io.no_return import no_return_of
 from hsslam.scan import LaserScan
 
 __all__ = ["LOOK_AHEAD", "CarmenStatistics", "CarmenWriter", "OnError", "read_carmen"]
@@ -153,8 +160,10 @@ def _scans(
     lines = read_lines(path)
     head = list(islice(lines, LOOK_AHEAD))
     parsers = _choose_parsers(head, state)
+    state.no_return = _no_return(head, parsers)
     index = 0
-    for number, line in enumerate(chain(head, lines), start=1):
+    lines = chain(head, lines)
+    for number, line in enumerate(lines, start=1):
         statistics.lines = number
         words = line.split()
         if not words:
@@ -176,7 +185,8 @@ def _scans(
                 label = "#" if name.startswith(b"#") else name[:32].decode("ascii", "replace")
                 statistics.ignored[label] += 1
         except MalformedError as error:
-            if on_error == "stop":
+            # What was being logged when the disk was full or the robot switched off: the end of many a log.
+            if on_error == "stop" and not (index and next(lines, None) is None):
                 raise DataError(
                     f"{path}:{number}: {error}; mend or delete the line, or have such lines skipped "
                     "(--on-error skip)"
@@ -201,6 +211,19 @@ def _choose_parsers(head: list[bytes], state: LogState) -> dict[bytes, _Parser]:
                 continue  # the reader proper reports it, with its line number
     with_pose, without = _WITH_POSE[state.laser], _WITHOUT_POSE[state.laser]
     return {**with_pose, **without} if names.isdisjoint(with_pose) else with_pose
+
+
+def _no_return(head: list[bytes], parsers: dict[bytes, _Parser]) -> float | None:
+    """What the scans at the beginning of a log read that have no return, of messages that do not tell."""
+    readings: list[NDArray[np.float64]] = []
+    for line in head:
+        words = line.split()
+        if words and words[0] in (b"FLASER", b"RLASER") and words[0] in parsers:
+            try:
+                readings.append(np.array(words[2 : 2 + int(words[1])], dtype=np.float64))
+            except (ValueError, IndexError):
+                continue  # the reader proper reports it, with its line number
+    return no_return_of(np.concatenate(readings)) if readings else None
 
 
 def _why_no_scans(path: Path, laser: Laser, statistics: CarmenStatistics) -> str:

@@ -11,6 +11,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from hsslam.io.no_return import refutes
 from hsslam.scan import LaserScan, ScanGeometry
 from hsslam.se2 import Pose, wrap
 
@@ -25,6 +26,13 @@ _NO_POSE_DIFFERENCE = 2e-6
 
 _STEPS_DEG = {180: 1.0, 181: 1.0, 360: 0.5, 361: 0.5}
 _NARROW_STEPS_DEG = {100: 1.0, 101: 1.0, 200: 0.5, 201: 0.5, 400: 0.25, 401: 0.25}
+_WIDE_DEG = {
+    **dict.fromkeys((540, 541), (-135.0, 0.5)),
+    **dict.fromkeys((682, 683), (-120.0, 360.0 / 1024.0)),
+    **dict.fromkeys((1080, 1081), (-135.0, 0.25)),
+}
+"""First beam and step of lasers that see more than half a turn, by their beams: SICK S300 and LMS1xx, Hokuyo URG-04LX
+and UTM-30LX."""
 
 
 class MalformedError(ValueError):
@@ -45,12 +53,15 @@ class LogState:
         From the newest ``ODOM`` line.
     parameters : dict
         Numbers from ``PARAM`` lines.
+    no_return : float, optional
+        What readings say that are no return, as far as the readings tell (m).
     """
 
     laser: Laser
     range_max: float | None = None
     odometry: Pose = field(default_factory=lambda: np.zeros(3))
     parameters: dict[str, float] = field(default_factory=dict)
+    no_return: float | None = None
 
     def mounted_pose(self) -> Pose:
         """Pose of the laser in the robot's frame, from the ``PARAM`` lines."""
@@ -62,23 +73,33 @@ class LogState:
             self.parameters.get(f"{name}_angular_offset", backwards),
         )
 
+    def look_at(self, ranges: NDArray[np.float64]) -> None:
+        """Readings further than what was taken for no return are returns: then that is one, too."""
+        if self.no_return is not None and refutes(ranges, self.no_return):
+            self.no_return = None
+
     def flaser_range_max(self) -> float:
         """Range limit of messages that carry none (m)."""
         if self.range_max is not None:
             return self.range_max
-        told = self.parameters.get(f"robot_{self.laser}_laser_max", FLASER_RANGE_MAX)
-        return min(told, FLASER_RANGE_MAX) if told > 0.0 else FLASER_RANGE_MAX
+        told = self.parameters.get(f"robot_{self.laser}_laser_max", 0.0)
+        if 0.0 < told <= FLASER_RANGE_MAX:
+            return told
+        return self.no_return if self.no_return is not None else FLASER_RANGE_MAX
 
 
 def parse_param(words: Words, state: LogState) -> None:
-    """``PARAM name value ...``: keep it if its value is a number."""
+    """``PARAM name value ...``: keep it if its value is a number; a laser's mounting must be one."""
+    name = words[1].decode("ascii", "replace") if len(words) > 1 else ""
+    mounting = name.startswith(("robot_frontlaser", "robot_rearlaser"))
     if len(words) < 3:
-        raise MalformedError(f"expected PARAM name value, found {_shown(words)}")
-    name = words[1].decode("ascii", "replace")
+        if mounting:
+            raise MalformedError(f"expected PARAM name value, found {_shown(words)}")
+        return
     try:
         state.parameters[name] = float(words[2])
     except ValueError:
-        if name.startswith(("robot_frontlaser", "robot_rearlaser")):
+        if mounting:
             raise MalformedError(f"expected a number for {name}, found {_text(words[2])}") from None
 
 
@@ -92,11 +113,16 @@ def parse_odom(words: Words, state: LogState) -> None:
 def parse_flaser(words: Words, state: LogState, index: int) -> LaserScan:
     """``FLASER`` and ``RLASER``: readings, the laser's pose, the robot's, stamp."""
     n = _count(words, 1, "number of readings")
-    _expect_words(words, n + 11, f"{_text(words[0])} with {n} readings")
-    poses = _finite(words, n + 2, n + 9, "x y theta odom_x odom_y odom_theta ipc_timestamp")
+    # Converters leave out the host and the logger's stamp, or all stamps; no line that lost a reading looks so.
+    if len(words) not in (n + 8, n + 9):
+        _expect_words(words, n + 11, f"{_text(words[0])} with {n} readings")
+    what = "x y theta odom_x odom_y odom_theta ipc_timestamp"
+    poses = [*_finite(words, n + 2, min(n + 9, len(words)), what), float(index)]
+    ranges = _readings(words, 2, n + 2)
+    state.look_at(ranges)
     return LaserScan(
         stamp=poses[6],
-        ranges=_readings(words, 2, n + 2),
+        ranges=ranges,
         geometry=_flaser_geometry(n, state.flaser_range_max(), state.parameters.get(_resolution(state))),
         odometry=_pose(poses[3], poses[4], poses[5]),
         laser_pose=state.mounted_pose(),
@@ -155,6 +181,9 @@ def beam_start_and_step(beams: int, resolution_deg: float | None = None) -> tupl
     if resolution_deg is not None and resolution_deg > 0.0:
         step = math.radians(resolution_deg)
         return -0.5 * step * (beams - 1), step
+    if beams in _WIDE_DEG:
+        first_deg, step_deg = _WIDE_DEG[beams]
+        return math.radians(first_deg), math.radians(step_deg)
     return -0.5 * math.pi, math.pi / max(beams - 1, 1)
 
 
