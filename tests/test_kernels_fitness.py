@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hsslam.kernels.assess import assess, degenerate_direction
+from hsslam.kernels.assess import BINS, assess, degenerate_direction, median_of
 from hsslam.kernels.fitness import count_hits, interpolate_points, scratch
 from hsslam.kernels.raster import Raster
 from hsslam.kernels.refine import NO_LINES, refine, solve3
@@ -269,3 +269,29 @@ def test_interpolation_tells_poses_apart_within_a_cell() -> None:
         for x in (0.0, 0.003, 0.006, 0.009, 0.012)
     ]
     assert (np.diff(worth) < 0).all()
+
+
+def test_clutter_does_not_open_a_direction_that_returns_fix() -> None:
+    """What one scan sees and the other does not says nothing of how noisy the lines are."""
+    rng = np.random.default_rng(1)
+
+    def scan() -> NDArray[np.float64]:
+        wall = np.column_stack((np.arange(-2.0, 2.0, 0.02), np.full(200, 1.5)))
+        end = np.column_stack((np.full(12, 2.0), 1.5 - 0.02 * np.arange(1, 13)))
+        return np.vstack((wall, end)) + rng.normal(0.0, 0.005, (212, 2))
+
+    reference, seen = scan(), scan()
+    seen[0:200:4, 1] -= 0.08
+    score, covariance, direction = assess(Surface.build(reference), seen, np.zeros(3), WINDOW, 0.1)
+    assert score > 0.9
+    assert np.isnan(direction)
+    assert np.sqrt(covariance[0, 0]) < 0.03
+
+
+@given(st.lists(st.floats(0.0, 0.999), min_size=1, max_size=300))
+@settings(deadline=None, max_examples=60)
+def test_a_histogram_tells_the_median_to_a_bin(values: list[float]) -> None:
+    counts = np.histogram(values, bins=BINS, range=(0.0, 1.0))[0]
+    low, high = np.sort(values)[[(len(values) - 1) // 2, len(values) // 2]]
+    assert low - 1.01 / BINS <= median_of(counts, len(values)) / BINS <= high + 1.01 / BINS
+    assert median_of(np.zeros(BINS, dtype=np.int64), 0) == 0.0

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
+from hsslam.kernels.lines import MEDIAN
 from hsslam.kernels.matrix3 import deflate
 from hsslam.kernels.surface import Surface, nearest_segment, squared_distance
 from hsslam.se2 import Points, Pose
@@ -24,6 +25,9 @@ since what is left counts as knowledge of a direction that may be open."""
 
 LARGEST_TILT = 0.5
 """Variance of a line's direction (rad^2) beyond which it points nowhere."""
+
+BINS = 50
+"""Of the histogram of distances across lines, from which their median is told."""
 
 DEGENERATE_SHARE = 0.1
 """Share of the window's variance that a direction must keep to count as open."""
@@ -84,7 +88,7 @@ def measure(
     matched, variance, hessian, feigned, gradient = gather(
         pieces, tilts, nearest, frame, points, pose, distance
     )
-    information = deflate(hessian, variance * feigned, SPURIOUS) / (variance * CORRELATION)
+    information = deflate(hessian, feigned, SPURIOUS) / (variance * CORRELATION)
     covariance = covariance_of(information, half)
     direction = degenerate_direction(covariance, half)
     known = covariance_of(hessian / variance, half)
@@ -158,7 +162,9 @@ def gather(
     hessian : float64 (3, 3)
         Of half the sum of these distances' squares.
     feigned : float64 (3, 3)
-        What of it the tilts of the lines add on average, per variance of a return.
+        What of it the tilts of the lines add on average. That goes by the noise of the returns, which clutter that
+        only one of the scans saw must not add to: it is told by the median of the distances, or by how far the
+        returns of each line stray from it, where that is more (far returns may be noisier than most).
     gradient : float64 (3,)
         Of half the sum, downhill.
     """
@@ -167,7 +173,8 @@ def gather(
     matched = 0
     most = LARGEST_TILT / (RANGE_STD * RANGE_STD)
     squares = xx = xy = xt = yy = yt = tt = gx = gy = gt = 0.0
-    fxx = fxt = fyt = ftt = 0.0
+    by_noise, by_lines = np.zeros(4), np.zeros(4)
+    counts = np.zeros(BINS, dtype=np.int64)
     for i in range(points.shape[0]):
         rx = c * points[i, 0] - s * points[i, 1]
         ry = s * points[i, 0] + c * points[i, 1]
@@ -178,6 +185,7 @@ def gather(
         matched += 1
         nx, ny = pieces[k, 5], pieces[k, 6]
         residual = nx * x + ny * y - pieces[k, 7]
+        counts[min(int(abs(residual) / distance * BINS), BINS - 1)] += 1
         squares += min(residual * residual, distance * distance)
         nt = ny * rx - nx * ry
         xx += nx * nx
@@ -191,12 +199,27 @@ def gather(
         gt -= nt * residual
         # A tilt with variance v turns n n' into (1 - v) n n' + v t t', with t along the line; what is to be taken
         # off is v (n n' + t t'), for then the mean of n n' (1 - v) - v t t' is (1 - 2 v) n n'.
-        tilt = min(tilts[k], most)
-        fxx += tilt
-        fxt -= tilt * ry
-        fyt += tilt * rx
-        ftt += tilt * (rx * rx + ry * ry)
+        tilt = min(tilts[k, 0], most)
+        for told, share in ((by_noise, tilt), (by_lines, tilt * tilts[k, 1])):
+            told[0] += share
+            told[1] -= share * ry
+            told[2] += share * rx
+            told[3] += share * (rx * rx + ry * ry)
     hessian = np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
-    feigned = np.array([[fxx, 0.0, fxt], [0.0, fxx, fyt], [fxt, fyt, ftt]])
     variance = max(squares / max(matched, 1), RANGE_STD * RANGE_STD)
+    deviation = median_of(counts, matched) * distance / BINS / MEDIAN
+    by_noise *= min(max(deviation * deviation, RANGE_STD * RANGE_STD), variance)
+    f = by_noise if by_noise[0] > by_lines[0] else by_lines
+    feigned = np.array([[f[0], 0.0, f[1]], [0.0, f[0], f[2]], [f[1], f[2], f[3]]])
     return matched, variance, hessian, feigned, np.array([gx, gy, gt])
+
+
+@kernel
+def median_of(counts: NDArray[np.int64], total: int) -> float:
+    """Median of a histogram of ``total`` values, in bins from the beginning of the first; 0 where there are none."""
+    below = 0
+    for b in range(counts.shape[0]):
+        if counts[b] > 0 and 2 * (below + counts[b]) >= total:
+            return float(b + (0.5 * total - below) / counts[b])
+        below += counts[b]
+    return 0.0

@@ -100,11 +100,12 @@ def fit_line(
     noise: float,
     out: NDArray[np.float64],
 ) -> None:
-    """Fit a line to the points around segment ``i``, ``i + 1``; into ``out`` (5,): point, normal, tilt.
+    """Fit a line to the points around segment ``i``, ``i + 1``; into ``out`` (6,): point, normal, tilt, variance.
 
-    The stretch grows by a point at each end in turn while it stays connected and within half of ``span`` of the
-    segment's middle. It is doubled while ``noise`` leaves the line's direction uncertain and the points are as near to
-    the line as noise alone would have them. With too rough a fit the segment itself is the line.
+    The latter two are those of `Surface.tilts`. The stretch grows by a point at each end in turn while it stays
+    connected and within half of ``span`` of the segment's middle. It is doubled while ``noise`` leaves the line's
+    direction uncertain and the points are as near to the line as noise alone would have them. With too rough a fit the
+    segment itself is the line.
     """
     dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
     length = math.sqrt(dx * dx + dy * dy)
@@ -114,6 +115,7 @@ def fit_line(
         out[4] = 2.0 / (length * length)
     else:
         out[2], out[3], out[4] = 0.0, 0.0, 0.0
+    out[5] = 0.0
     strays = max(roughness, SAME * noise)
     for _ in range(WIDENINGS + 1):
         _fit_within(points, i, gap, span, strays, out)
@@ -122,7 +124,7 @@ def fit_line(
         span *= 2.0
         strays = SAME * noise
     if noise * noise * out[4] > VAGUE * VAGUE:
-        out[2], out[3], out[4] = 0.0, 0.0, 0.0
+        out[2], out[3], out[4], out[5] = 0.0, 0.0, 0.0, 0.0
 
 
 @kernel
@@ -174,3 +176,4 @@ def _fit_within(
     out[0], out[1] = cx, cy
     out[2], out[3] = -uy / length, ux / length
     out[4] = 1.0 / (half_trace + root)
+    out[5] = max(half_trace - root, 0.0) / (count - 2)

@@ -57,8 +57,9 @@ class Surface:
         What the distance of a place from a segment and from its line is computed from, side by side in memory: a
         segment's beginning ``ax, ay``, unit direction ``ux, uy`` and length, then the fitted line's unit normal
         and offset, ``nx * x + ny * y = offset``; a lone return's direction and normal are zero.
-    tilts : float64 (S,)
-        Variance of the fitted line's direction, per variance of a return across it (1 / m^2); 0 for a lone return.
+    tilts : float64 (S, 2)
+        Variance of the fitted line's direction per variance of a return across it (1 / m^2), and that variance as
+        the returns that it was fitted to tell it (m^2; 0 where they are two); both 0 for a lone return.
     nearest : uint32 (H, W)
         For each cell's centre the nearest segment: see `nearest_segment`.
     frame : float64 (4,)
@@ -128,8 +129,8 @@ def join(
     n = points.shape[0]
     segments = np.empty((n, 4))
     pieces = np.empty((n, 8))
-    tilts = np.empty(n)
-    line = np.empty(5)
+    tilts = np.empty((n, 2))
+    line = np.empty(6)
     noise = noise_of(points, gap)
     count = 0
     joined_before = False
@@ -158,7 +159,7 @@ def join(
             pieces[count, 4] = length
             pieces[count, 5], pieces[count, 6] = line[2], line[3]
             pieces[count, 7] = line[2] * line[0] + line[3] * line[1]
-            tilts[count] = line[4]
+            tilts[count, 0], tilts[count, 1] = line[4], line[5]
             count += 1
         joined_before = joined
     return segments[:count].copy(), pieces[:count].copy(), tilts[:count].copy()
@@ -169,7 +170,7 @@ def lines_of(points: Points, gap: float, span: float, roughness: float) -> NDArr
     """Line through each point and its neighbours: unit normal and offset, (N, 3); zero where there are none."""
     n = points.shape[0]
     lines = np.empty((n, 3))
-    line = np.zeros(5)
+    line = np.zeros(6)
     noise = noise_of(points, gap)
     joined_before = False
     for i in range(n):

@@ -29,6 +29,12 @@ SOONER = 1.0 / 3.0
 EDGE_GAIN = 0.02
 """An answer beyond the window is believed only if its score is this much higher: among many places one seems better."""
 
+USUAL = 0.05
+"""A scan fits as usual if its score is no further than this below those of the last scans."""
+
+FORGETTING = 0.1
+"""Share of the newest score in what is usual."""
+
 RECOVERY_GAIN = 0.1
 """Odometry is overruled only by an answer whose score is this much higher."""
 
@@ -67,6 +73,7 @@ class Tracker:
         self._motion = MotionModel(config.graph)
         self._pose: Pose = np.zeros(3)
         self._covariance: NDArray[np.float64] = np.zeros((3, 3))
+        self._usual_score = 1.0
         self.motion: Pose = np.zeros(3)
         """Motion predicted from the last scan but one to the last, in the frame of the former."""
         self.noise: NDArray[np.float64] = np.eye(3)
@@ -105,6 +112,7 @@ class Tracker:
         self.motion, self.noise = moved, rotated(noise, predicted[2])
         newest = self._submap.newest
         pose, posterior = compose(newest, tracked.relative), rotated(tracked.covariance, -newest[2])
+        self._usual_score += FORGETTING * (tracked.score - self._usual_score)
         self.guessed = not tracked.matched and self._motion.still(scan)
         self._motion.observe(scan, between(self._pose, pose))
         self._pose, self._covariance = pose, posterior
@@ -159,8 +167,8 @@ class Tracker:
         off = result.pose - predicted
         off[2] = wrap(off[2])
         direction = result.diagnostics.get("degenerate_direction")
-        if direction is not None and result.score >= self._config.keyframes.min_score:
-            # All places along it are as good, those at the edge too: a bare wall's are, if the scan fits it.
+        if direction is not None and result.score >= self._usual_score - USUAL:
+            # All places along it are as good, those at the edge too: a bare wall's are, if the scan fits as ever.
             along = np.array([math.cos(direction), math.sin(direction), 0.0])
             off -= (off @ along) * along
         return _at_edge(off, window)
