@@ -75,3 +75,22 @@ def test_a_bare_corridor_does_not_carry_the_robot_away_from_good_odometry() -> N
             step = event.pose[0] - last
             assert abs(step - 0.1) < 0.2, f"scan {i} moved by {step:.2f} m, odometry by 0.10 m"
         last = event.pose[0]
+
+
+def with_companions(scan: LaserScan) -> LaserScan:
+    """The scan, with people who keep their places beside the robot before a third of its beams."""
+    ranges = scan.ranges.copy()
+    for k, first in enumerate(range(0, len(ranges), 90)):
+        beams = slice(first, first + 27)
+        ranges[beams] = np.minimum(ranges[beams], 0.8 + 0.15 * (7 * k % 5))
+    return replace(scan, ranges=ranges)
+
+
+def test_people_who_walk_along_do_not_stop_the_robot() -> None:
+    slam = Slam(load_config())
+    for index in range(23):
+        truth = pose(-1.2 + 0.1 * index, 0.0, 0.0)
+        scan = with_companions(room_scan_at(truth, beams=361, noise=0.01, seed=index))
+        event = slam.process(replace(scan, index=index, stamp=0.3 * index, odometry=truth))[0]
+    assert isinstance(event, Tracked)
+    assert event.pose == pytest.approx(truth, abs=0.1)

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import Config
+from hsslam.kernels.assess import assess
 from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
 from hsslam.scan import LaserScan
 from hsslam.se2 import Points, Pose, between, compose, wrap
-from hsslam.slam.fusion import fuse, rotated
+from hsslam.slam.fusion import GATE, fuse, rotated, squared_mahalanobis
 from hsslam.slam.motion import MotionModel
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.stopwatch import Stopwatch
@@ -35,8 +36,11 @@ USUAL = 0.05
 FORGETTING = 0.1
 """Share of the newest score in what is usual."""
 
-RECOVERY_GAIN = 0.1
-"""Odometry is overruled only by an answer whose score is this much higher."""
+AGREEING = SearchWindow(0.04, 0.04, math.radians(2.0))
+"""Window around odometry's prediction in which an answer agrees with it, at least."""
+
+RECOVERY_GAIN = 0.12
+"""Odometry is overruled only by an answer whose score is this much higher: people who walk along see no motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,9 +148,14 @@ class Tracker:
         window = foreseen_window(max(prior[0, 0], prior[1, 1]), prior[2, 2], self._window, self._widest)
         with self._stopwatch.measure("track"):
             result = match_within(self._matcher, reference, points, predicted, window, self._window, rng)
-        if self._cut_off(result, predicted, window):
+        # An outage looks like odometry that reports no motion: then it tells nothing that could be contradicted.
+        told = not (self._motion.silent or self._motion.still(scan))
+        if self._cut_off(result, predicted, window, told):
             with self._stopwatch.measure("recover"):
                 result = self._look_further(reference, points, predicted, result, rng)
+        if told and _contradicts(result, predicted, prior):
+            with self._stopwatch.measure("recover"):
+                result = self._agree(reference, points, predicted, prior, result, rng)
         if not result.converged or result.score < rules.recovery_score:
             with self._stopwatch.measure("recover"):
                 result = self._recover(reference, points, result, rng)
@@ -162,12 +171,12 @@ class Tracker:
             between(newest, pose), rotated(covariance, newest[2]), result.score, matched, result.evaluations
         )
 
-    def _cut_off(self, result: MatchResult, predicted: Pose, window: SearchWindow) -> bool:
-        """Whether a better answer may lie beyond the edge of the window around the prediction."""
+    def _cut_off(self, result: MatchResult, predicted: Pose, window: SearchWindow, told: bool) -> bool:
+        """Whether a better answer may lie beyond the edge of the window around the prediction, which odometry told."""
         off = result.pose - predicted
         off[2] = wrap(off[2])
         direction = result.diagnostics.get("degenerate_direction")
-        if direction is not None and result.score >= self._usual_score - USUAL:
+        if told and direction is not None and result.score >= self._usual_score - USUAL:
             # All places along it are as good, those at the edge too: a bare wall's are, if the scan fits as ever.
             along = np.array([math.cos(direction), math.sin(direction), 0.0])
             off -= (off @ along) * along
@@ -186,6 +195,27 @@ class Tracker:
         better = wide.converged and (not first.converged or wide.score > first.score + EDGE_GAIN)
         return replace(wide if better else first, evaluations=first.evaluations + wide.evaluations)
 
+    def _agree(
+        self,
+        reference: Reference,
+        points: Points,
+        predicted: Pose,
+        prior: NDArray[np.float64],
+        first: MatchResult,
+        rng: np.random.Generator,
+    ) -> MatchResult:
+        """Search only where odometry may be right: what fits about as well there is likelier than what denies it."""
+        window = foreseen_window(max(prior[0, 0], prior[1, 1]), prior[2, 2], AGREEING, self._window)
+        near = self._matcher.match(reference, points, predicted, window, rng)
+        evaluations = first.evaluations + near.evaluations
+        if not near.converged or near.score <= first.score - RECOVERY_GAIN:
+            return replace(first, evaluations=evaluations)
+        # What so narrow a window adds to the covariance is odometry's, and odometry is weighed by itself.
+        _, covariance, _ = assess(
+            reference.surface, points, near.pose, self._window.half, self._matcher.config.score_distance
+        )
+        return replace(near, covariance=covariance, evaluations=evaluations)
+
     def _recover(
         self, reference: Reference, points: Points, first: MatchResult, rng: np.random.Generator
     ) -> MatchResult:
@@ -203,3 +233,10 @@ class Tracker:
 
 def _at_edge(off: Pose, window: SearchWindow) -> bool:
     return bool((np.abs(off) > EDGE * window.half).any())
+
+
+def _contradicts(result: MatchResult, predicted: Pose, prior: NDArray[np.float64]) -> bool:
+    """Whether a match and the prediction cannot both be right."""
+    off = result.pose - predicted
+    off[2] = wrap(off[2])
+    return result.converged and squared_mahalanobis(off, prior + result.covariance) > GATE
