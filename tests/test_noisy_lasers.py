@@ -91,4 +91,4 @@ def test_along_a_bare_wall_a_noisy_laser_does_not_lead_the_robot_astray() -> Non
         between_many(log.poses[:1].repeat(240, axis=0), log.poses),
         between_many(online[:1].repeat(240, axis=0), online),
     )
-    assert np.hypot(error[:, 0], error[:, 1]).max() < 1.5
+    assert np.hypot(error[:, 0], error[:, 1]).max() < 0.6
