@@ -192,8 +192,10 @@ class Tracker:
     ) -> MatchResult:
         """Search the widest window around the prediction: what a narrow one found at its edge was cut off by it."""
         wide = match_within(self._matcher, reference, points, predicted, self._widest, self._window, rng)
-        better = wide.converged and (not first.converged or wide.score > first.score + EDGE_GAIN)
-        return replace(wide if better else first, evaluations=first.evaluations + wide.evaluations)
+        evaluations = first.evaluations + wide.evaluations
+        if wide.converged and (not first.converged or wide.score > first.score + EDGE_GAIN):
+            return self._settled(reference, points, wide, evaluations, rng)
+        return replace(first, evaluations=evaluations)
 
     def _agree(
         self,
@@ -211,10 +213,7 @@ class Tracker:
         if not near.converged or near.score <= first.score - RECOVERY_GAIN:
             return replace(first, evaluations=evaluations)
         # What so narrow a window adds to the covariance is odometry's, and odometry is weighed by itself.
-        _, covariance, _ = assess(
-            reference.surface, points, near.pose, self._window.half, self._matcher.config.score_distance
-        )
-        return replace(near, covariance=covariance, evaluations=evaluations)
+        return self._known_within(self._window, reference, points, replace(near, evaluations=evaluations))
 
     def _recover(
         self, reference: Reference, points: Points, first: MatchResult, rng: np.random.Generator
@@ -227,8 +226,33 @@ class Tracker:
         if not best.converged or best.score < rules.recovery_score:
             best = match_within(self._matcher, reference, points, repeated, self._widest, self._window, rng)
             evaluations += best.evaluations
-        better = best.converged and (not first.converged or best.score > first.score + RECOVERY_GAIN)
-        return replace(best if better else first, evaluations=evaluations)
+        if best.converged and (not first.converged or best.score > first.score + RECOVERY_GAIN):
+            return self._settled(reference, points, best, evaluations, rng)
+        return replace(first, evaluations=evaluations)
+
+    def _settled(
+        self,
+        reference: Reference,
+        points: Points,
+        found: MatchResult,
+        evaluations: int,
+        rng: np.random.Generator,
+    ) -> MatchResult:
+        """Search once more around what was found far off: the wide window, too, may have cut it off short of the best."""
+        near = self._matcher.match(reference, points, found.pose, self._window, rng)
+        evaluations += near.evaluations
+        if not near.converged or near.score < found.score:
+            return replace(found, evaluations=evaluations)
+        return self._known_within(self._widest, reference, points, replace(near, evaluations=evaluations))
+
+    def _known_within(
+        self, window: SearchWindow, reference: Reference, points: Points, result: MatchResult
+    ) -> MatchResult:
+        """A match with the covariance that it has in another window: where points leave a direction open, the window tells."""
+        _, covariance, _ = assess(
+            reference.surface, points, result.pose, window.half, self._matcher.config.score_distance
+        )
+        return replace(result, covariance=covariance)
 
 
 def _at_edge(off: Pose, window: SearchWindow) -> bool:
