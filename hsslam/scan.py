@@ -105,12 +105,15 @@ class LaserScan:
 
     @cached_property
     def robot_points(self) -> Points:
-        """Returns in the frame of the robot at the stamp, in beam order, (N, 2) m."""
+        """Returns in the frame of the robot at the stamp, counter-clockwise, (N, 2) m.
+
+        That is the order of the beams, or its reverse where they run clockwise: it tells a wall's two sides apart.
+        """
         points = transform(self.laser_pose, self.points) if self.laser_pose.any() else self.points
-        if self.geometry.time_increment == 0.0 or not self.velocity.any():
-            return points
-        seconds = self.geometry.time_increment * np.flatnonzero(self.valid)
-        return _moved(points, seconds[:, None] * self.velocity)
+        if self.geometry.time_increment != 0.0 and self.velocity.any():
+            seconds = self.geometry.time_increment * np.flatnonzero(self.valid)
+            points = _moved(points, seconds[:, None] * self.velocity)
+        return points if self.geometry.angle_increment > 0.0 else points[::-1].copy()
 
 
 def _moved(points: Points, twists: NDArray[np.float64]) -> Points:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -82,3 +83,14 @@ def test_default_poses_are_not_shared() -> None:
     one.odometry[0] = 5.0
     assert other.odometry.tolist() == [0.0, 0.0, 0.0]
     assert other.laser_pose.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_the_robots_points_go_round_counter_clockwise_whichever_way_the_beams_do() -> None:
+    ranges = np.linspace(1.0, 2.0, 90)
+    geometry = ScanGeometry(-0.5, 0.01, range_max=10.0, time_increment=1e-3)
+    scan = LaserScan(0.0, ranges, geometry)
+    backwards = LaserScan(0.0, ranges[::-1].copy(), replace(geometry, angle_min=-0.5 + 0.89, angle_increment=-0.01))
+    assert backwards.robot_points == pytest.approx(scan.robot_points)
+    moving = replace(backwards, velocity=np.array([1.0, 0.0, 0.0]))
+    assert moving.robot_points[-1] == pytest.approx(scan.robot_points[-1])
+    assert moving.robot_points[0] == pytest.approx(scan.robot_points[0] + [0.089, 0.0])

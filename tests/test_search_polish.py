@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
 from hsslam.datasets.simulator import simulate_pairs
 from hsslam.kernels.refine import NO_LINES, refine
 from hsslam.matching.interface import Reference, SearchWindow
-from hsslam.se2 import between
+from hsslam.se2 import Points, between
 from hsslam.search.polish import REACHES, SCALES, SETTLE, polish
+
+WALL = 0.12
+"""Thickness of the wall between two rooms (m)."""
 
 WIDE = SearchWindow(0.5, 0.5, math.radians(30.0))
 
@@ -39,3 +43,27 @@ def test_lines_of_both_scans_are_better_than_those_of_one() -> None:
         both_ways.append(np.hypot(*between(truth, found)[:2]))
     assert np.mean(both_ways) < 0.97 * np.mean(one_way)
     assert np.mean(both_ways) < 0.004
+
+
+def along(start: tuple[float, float], end: tuple[float, float]) -> Points:
+    """Returns every 3 cm from one place to another, with 5 mm of noise."""
+    count = int(np.hypot(end[0] - start[0], end[1] - start[1]) / 0.03)
+    places = np.linspace(start, end, count)
+    return places + np.random.default_rng(count).normal(0.0, 0.005, places.shape)
+
+
+def test_the_two_sides_of_a_thin_wall_are_not_taken_for_one() -> None:
+    """Through a door in it two rooms share what lies beyond; each has its own side of the wall."""
+    half = 0.5 * WALL
+    shared = along((0.4, 5.0), (-0.4, 5.0))
+    below = np.vstack(
+        (along((3.0, -3.0), (3.0, -half)), along((3.0, -half), (0.5, -half)), shared,
+         along((-0.5, -half), (-3.0, -half)), along((-3.0, -half), (-3.0, -3.0)))
+    )  # fmt: skip
+    above = np.vstack(
+        (along((-3.0, 5.0), (-3.0, half)), along((-3.0, half), (-0.5, half)), along((0.5, half), (3.0, half)),
+         along((3.0, half), (3.0, 5.0)), shared)
+    )  # fmt: skip
+    start = np.array([0.0, -0.4 * WALL, 0.0])
+    found, _ = polish(Reference(below), above, start, start, WIDE, 40)
+    assert found == pytest.approx(np.zeros(3), abs=0.01)

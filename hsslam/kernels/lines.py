@@ -102,10 +102,12 @@ def fit_line(
 ) -> None:
     """Fit a line to the points around segment ``i``, ``i + 1``; into ``out`` (6,): point, normal, tilt, variance.
 
-    The latter two are those of `Surface.tilts`. The stretch grows by a point at each end in turn while it stays
-    connected and within half of ``span`` of the segment's middle. It is doubled while ``noise`` leaves the line's
-    direction uncertain and the points are as near to the line as noise alone would have them. With too rough a fit the
-    segment itself is the line.
+    The normal is to the left of who goes along the surface in the order of the points, so that the two sides of a
+    thin wall have opposite ones. The latter two are those of `Surface.tilts`.
+
+    The stretch grows by a point at each end in turn while it stays connected and within half of ``span`` of the
+    segment's middle. It is doubled while ``noise`` leaves the line's direction uncertain and the points are as near to
+    the line as noise alone would have them. With too rough a fit the segment itself is the line.
     """
     dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
     length = math.sqrt(dx * dx + dy * dy)
@@ -173,6 +175,8 @@ def _fit_within(
     across = 0.5 * (xx - yy)
     ux, uy = (across + root, xy) if across > 0.0 else (xy, root - across)
     length = math.sqrt(ux * ux + uy * uy)
+    if ux * (points[last, 0] - points[first, 0]) + uy * (points[last, 1] - points[first, 1]) < 0.0:
+        length = -length
     out[0], out[1] = cx, cy
     out[2], out[3] = -uy / length, ux / length
     out[4] = 1.0 / (half_trace + root)

@@ -35,7 +35,8 @@ def refine(
 
     Where the scan's own lines are given, the place on the segment nearest to a point is also to lie on the line
     through the scan at that point: the noise of either scan then counts in one of the two distances only, and the
-    lines of neither are taken for the truth.
+    lines of neither are taken for the truth. And a point whose line runs the other way is left out: it is of the
+    other side of a wall, which robots in neighbouring rooms see 10 to 20 cm apart.
 
     Parameters
     ----------
@@ -44,8 +45,8 @@ def refine(
     points : Points
         (N, 2) m.
     lines : float64 (N, 3)
-        Unit normals and offsets of the scan's lines at its points, zero where it has none: see `lines_of`. (0, 3):
-        point-to-line only.
+        Unit normals, to the left of who goes along the surface in the order of the points, and offsets of the
+        scan's lines at its points, zero where it has none: see `lines_of`. (0, 3): point-to-line only.
     start : Pose
         Where to begin.
     iterations : int
@@ -89,6 +90,12 @@ def refine(
             if ex * ex + ey * ey > distance * distance:
                 continue
             nx, ny = pieces[k, 5], pieces[k, 6]
+            mx = my = agreement = 0.0
+            if both:
+                mx, my = c * lines[i, 0] - s * lines[i, 1], s * lines[i, 0] + c * lines[i, 1]
+                agreement = nx * mx + ny * my
+                if agreement < -LEAST_AGREEMENT:
+                    continue
             residual = nx * x + ny * y - pieces[k, 7]
             weight = squared_scale / (squared_scale + residual * residual)
             nt = ny * rx - nx * ry
@@ -103,11 +110,7 @@ def refine(
             gx += wx * residual
             gy += wy * residual
             gt += wt * residual
-            if not (settled and both):
-                continue
-            mx, my = c * lines[i, 0] - s * lines[i, 1], s * lines[i, 0] + c * lines[i, 1]
-            agreement = nx * mx + ny * my
-            if abs(agreement) < LEAST_AGREEMENT:
+            if not (settled and both) or agreement < LEAST_AGREEMENT:
                 continue
             sx, sy = x - ex - x0, y - ey - y0
             residual = lines[i, 2] - mx * sx - my * sy

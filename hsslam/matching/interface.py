@@ -99,7 +99,8 @@ class Reference:
     ----------
     points : Points
         (N, 2) m. Neighbours in the array that are close to one another are taken for neighbours on a
-        surface, so keep a scan's beams in their order; scans may follow one another.
+        surface, so keep a scan's beams in their order; scans may follow one another. The order also tells from
+        which side a wall was seen: scans that are matched go round in the same sense.
     surface : Surface, optional
         Through the points, where it is known; made when it is asked for where left out.
     """
