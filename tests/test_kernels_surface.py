@@ -101,6 +101,16 @@ def test_a_point_has_the_line_of_the_segment_that_begins_there_or_ends_where_non
         assert line == pytest.approx(surface.pieces[own, 5:8])
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.01, 0.03, 0.05])
+def test_all_normals_of_a_wall_are_on_the_same_side_whatever_its_noise(noise: float) -> None:
+    there = wall(spacing=0.02, noise=noise)
+    for points, side in ((there, 1.0), (there[::-1].copy(), -1.0)):
+        lines = lines_of(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
+        known = np.abs(lines[:, :2]).max(axis=1) > 0.0
+        assert known.mean() > 0.9
+        assert (side * lines[known, 1] > 0.0).all()
+
+
 def test_normals_are_unit_and_zero_for_a_lone_return() -> None:
     surface = Surface.build(np.vstack((wall(), [[10.0, 10.0]])))
     lengths = np.linalg.norm(surface.pieces[:, 5:7], axis=1)

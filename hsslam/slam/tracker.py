@@ -153,7 +153,7 @@ class Tracker:
         if self._cut_off(result, predicted, window, told):
             with self._stopwatch.measure("recover"):
                 result = self._look_further(reference, points, predicted, result, rng)
-        if told and _contradicts(result, predicted, prior):
+        if told and (_contradicts(result, predicted, prior) or result.score < rules.recovery_score):
             with self._stopwatch.measure("recover"):
                 result = self._agree(reference, points, predicted, prior, result, rng)
         if not result.converged or result.score < rules.recovery_score:
