@@ -89,7 +89,9 @@ def test_the_robots_points_go_round_counter_clockwise_whichever_way_the_beams_do
     ranges = np.linspace(1.0, 2.0, 90)
     geometry = ScanGeometry(-0.5, 0.01, range_max=10.0, time_increment=1e-3)
     scan = LaserScan(0.0, ranges, geometry)
-    backwards = LaserScan(0.0, ranges[::-1].copy(), replace(geometry, angle_min=-0.5 + 0.89, angle_increment=-0.01))
+    backwards = LaserScan(
+        0.0, ranges[::-1].copy(), replace(geometry, angle_min=-0.5 + 0.89, angle_increment=-0.01)
+    )
     assert backwards.robot_points == pytest.approx(scan.robot_points)
     moving = replace(backwards, velocity=np.array([1.0, 0.0, 0.0]))
     assert moving.robot_points[-1] == pytest.approx(scan.robot_points[-1])

@@ -193,9 +193,8 @@ class Tracker:
         """Search the widest window around the prediction: what a narrow one found at its edge was cut off by it."""
         wide = match_within(self._matcher, reference, points, predicted, self._widest, self._window, rng)
         evaluations = first.evaluations + wide.evaluations
-        if wide.converged and (not first.converged or wide.score > first.score + EDGE_GAIN):
-            return self._settled(reference, points, wide, evaluations, rng)
-        return replace(first, evaluations=evaluations)
+        better = wide.converged and (not first.converged or wide.score > first.score + EDGE_GAIN)
+        return self._settled(reference, points, wide if better else first, evaluations, rng)
 
     def _agree(
         self,
@@ -238,17 +237,17 @@ class Tracker:
         evaluations: int,
         rng: np.random.Generator,
     ) -> MatchResult:
-        """Search once more around what was found far off: the wide window, too, may have cut it off short of the best."""
+        """Search once more around what was found far off: the wide window, too, may have cut it off."""
         near = self._matcher.match(reference, points, found.pose, self._window, rng)
         evaluations += near.evaluations
-        if not near.converged or near.score < found.score:
+        if not near.converged or near.score < found.score - EDGE_GAIN:
             return replace(found, evaluations=evaluations)
         return self._known_within(self._widest, reference, points, replace(near, evaluations=evaluations))
 
     def _known_within(
         self, window: SearchWindow, reference: Reference, points: Points, result: MatchResult
     ) -> MatchResult:
-        """A match with the covariance that it has in another window: where points leave a direction open, the window tells."""
+        """A match with its covariance in another window, which tells where the points leave a direction open."""
         _, covariance, _ = assess(
             reference.surface, points, result.pose, window.half, self._matcher.config.score_distance
         )
