@@ -22,6 +22,9 @@ MEDIAN = 0.6745
 ENOUGH = 5
 """Chords that tell of noise, at least."""
 
+PLENTY = 120
+"""Returns that are asked, at most: a median needs no more."""
+
 STEADY = 0.12
 """Standard deviation (rad) of a line's direction, up to which no more returns are needed."""
 
@@ -40,8 +43,8 @@ VAGUE = 0.35
 def noise_of(points: Points, gap: float) -> float:
     """Standard deviation (m) of returns across the surface that they lie on, from the returns themselves.
 
-    The median over all returns of their distances from chords to either side, as it would be on plain surfaces: what
-    corners and edges add are outliers to it. 0 where too few returns have neighbours to tell.
+    The median of the distances of up to `PLENTY` of them, spread over all, from chords to either side, as it would be on
+    plain surfaces: what corners and edges add are outliers to it. 0 where too few returns have neighbours to tell.
     """
     noise = _noise_about_chords(points, gap, ARM)
     if noise > LONG * ARM:
@@ -56,7 +59,7 @@ def _noise_about_chords(points: Points, gap: float, arm: float) -> float:
     n = points.shape[0]
     found = np.empty(n)
     count = 0
-    for i in range(1, n - 1):
+    for i in range(1, n - 1, 1 + n // PLENTY):
         a = _end_of_arm(points, i, -1, gap, arm)
         b = _end_of_arm(points, i, 1, gap, arm)
         dx, dy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
