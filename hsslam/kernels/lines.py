@@ -43,8 +43,8 @@ VAGUE = 0.35
 def noise_of(points: Points, gap: float) -> float:
     """Standard deviation (m) of returns across the surface that they lie on, from the returns themselves.
 
-    The median of the distances of up to `PLENTY` of them, spread over all, from chords to either side, as it would be on
-    plain surfaces: what corners and edges add are outliers to it. 0 where too few returns have neighbours to tell.
+    The median of the distances of up to `PLENTY` of them, spread over all, from chords to either side, as it would be
+    on plain surfaces: what corners and edges add are outliers to it. 0 where too few returns have neighbours to tell.
     """
     noise = _noise_about_chords(points, gap, ARM)
     if noise > LONG * ARM:
