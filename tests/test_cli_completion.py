@@ -35,6 +35,12 @@ def completed(line: str, after: str = "") -> list[str]:
         ("hsslam run --preset urg", ["urg-04lx"]),
         ("hsslam compare off", ["office"]),
         ("hsslam compare office --matchers kiss", ["kiss_icp"]),
+        ("hsslam compare --matchers hide h", ["hide", "hsl"]),
+        ("hsslam compare office --matchers hide gl", ["glasm"]),
+        ("hsslam compare --matchers hide,gl", ["hide,glasm"]),
+        ("hsslam compare --matchers hsl hide --datasets office cor", ["corridor"]),
+        ("hsslam compare corridor --matchers hide --see", ["--seed", "--seeds"]),
+        ("hsslam compare corridor --seeds 2 --dataset off", ["office"]),
         ("hsslam matchers describe hs", ["hsl"]),
     ],
 )

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
+from hsslam.cli import running
 from hsslam.cli.main import app
 from hsslam.config import load_config
 from hsslam.slam.folder import FILES
@@ -121,6 +122,20 @@ def test_a_log_file_runs_and_prints_a_summary(tmp_path: Path, monkeypatch: pytes
     assert summary["matcher"].strip().startswith("hsl: ")
     assert "ATE" in summary
     assert summary["output"].strip() == f"{folder.relative_to(tmp_path)}/"
+
+
+@pytest.mark.parametrize(
+    ("scans", "factor", "said"), [(1, 0.0, "2.0 s"), (40, 0.24, "2.0 s (0.24 times real time)")]
+)
+def test_speed_is_told_where_it_has_a_meaning(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scans: int, factor: float, said: str
+) -> None:
+    times = running._timings
+    known = {"wall_s": 2.0, "real_time_factor": factor}
+    monkeypatch.setattr(running, "_timings", lambda *args: {**times(*args), **known})
+    result = hsslam("run", "office", "--scans", scans, "--out", tmp_path / "run")
+    summary = dict(line.split("  ", 1) for line in result.stdout.splitlines() if "  " in line)
+    assert summary["wall time"].strip() == said
 
 
 def test_no_colour_and_no_bars_where_there_is_no_terminal(tmp_path: Path) -> None:

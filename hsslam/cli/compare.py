@@ -34,7 +34,8 @@ _STAGES = {
 }
 
 
-_LISTS = ("--matchers", "--datasets")
+_LISTS = {"--matchers": complete.several_matchers, "--datasets": complete.several_datasets}
+_OPEN_LIST = "hsslam.open_list"
 
 
 class ManyNames(TyperCommand):
@@ -52,7 +53,20 @@ class ManyNames(TyperCommand):
                 joined[-1] += f",{arg}"
             else:
                 joined.append(arg)
+        ctx.meta[_OPEN_LIST] = next((a for a in reversed(args) if a.startswith("-")), "") if taking else ""
         return super().parse_args(ctx, joined)
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
+        """Offer the next name of a list where the dataset is there already and the parser sees only options."""
+        option = ctx.meta.get(_OPEN_LIST)
+        if option and not incomplete.startswith("-"):
+            return next(p for p in self.params if option in p.opts).shell_complete(ctx, incomplete)
+        return super().shell_complete(ctx, incomplete)
+
+
+def _next_name(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Datasets, or the next name of a list that was begun: the parser takes it for the dataset's."""
+    return _LISTS.get(ctx.meta.get(_OPEN_LIST, ""), complete.datasets)(incomplete)
 
 
 def compare(
@@ -61,20 +75,27 @@ def compare(
         typer.Argument(
             metavar="[DATASET|PATH]",
             help="A name that `hsslam datasets` lists, or a log; office if left out.",
-            autocompletion=complete.datasets,
+            autocompletion=_next_name,
         ),
     ] = None,
-    dataset: Annotated[str | None, typer.Option(metavar="NAME|PATH", help="The same, as an option.")] = None,
+    dataset: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|PATH", help="The same, as an option.", autocompletion=complete.datasets),
+    ] = None,
     datasets: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME|PATH...", help="Several: each has its part of the report."),
+        typer.Option(
+            metavar="NAME|PATH...",
+            help="Several: each has its part of the report.",
+            autocompletion=complete.several_datasets,
+        ),
     ] = None,
     matchers: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME...",
             help="Which, or `all`; the paper's three, icp and kiss_icp if left out.",
-            autocompletion=complete.matchers,
+            autocompletion=complete.several_matchers,
         ),
     ] = None,
     trials: Annotated[

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 
 def matchers(incomplete: str) -> list[str]:
     """Names of installed matchers that begin like this."""
@@ -29,6 +31,21 @@ def datasets(incomplete: str) -> list[str]:
     from hsslam.datasets import catalogue
 
     return _begin_like(incomplete, set(catalogue.names()))
+
+
+def several_matchers(incomplete: str) -> list[str]:
+    """Matchers for the last name of ``a,b,c``, with what stands before it."""
+    return _last_of(incomplete, matchers)
+
+
+def several_datasets(incomplete: str) -> list[str]:
+    """Datasets for the last name of ``a,b,c``, with what stands before it."""
+    return _last_of(incomplete, datasets)
+
+
+def _last_of(incomplete: str, names: Callable[[str], list[str]]) -> list[str]:
+    before, comma, last = incomplete.rpartition(",")
+    return [f"{before}{comma}{name}" for name in names(last)]
 
 
 def _begin_like(incomplete: str, names: set[str]) -> list[str]:

@@ -80,7 +80,7 @@ def summary(
         ("dataset", f"{log.info.name}: {metrics['scans']:,} scans, {duration:,.0f} s of driving"),
         ("matcher", f"{metrics['matcher']}: {metrics['matched']:,} of {metrics['scans']:,} scans matched"),
         *([("lost", lost)] if (lost := _lost(metrics)) else []),
-        ("wall time", f"{timings['wall_s']:.1f} s ({timings['real_time_factor']:.0f} times real time)"),
+        ("wall time", _wall_time(timings)),
         ("keyframes", f"{metrics['keyframes']:,}"),
         ("loops", f"{metrics['loops_accepted']:,} accepted of {metrics['loops_tried']:,} tried"),
         *([("skipped", f"{skipped:,} malformed lines")] if (skipped := metrics["skipped_lines"]) else []),
@@ -88,6 +88,15 @@ def summary(
         *accuracy.rows(metrics),
         ("output", f"{folder.path}/"),
     ]
+
+
+def _wall_time(timings: dict[str, Any]) -> str:
+    """Seconds, and how many times faster than the robot drove where the log tells how long that took."""
+    wall = f"{timings['wall_s']:.1f} s"
+    factor = timings["real_time_factor"]
+    if not factor:
+        return wall
+    return f"{wall} ({f'{factor:.0f}' if factor >= 10.0 else f'{factor:.2g}'} times real time)"
 
 
 def _lost(metrics: dict[str, Any]) -> str:
