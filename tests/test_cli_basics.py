@@ -29,6 +29,13 @@ def shown(*args: str | Path) -> dict[str, object]:
     return loaded
 
 
+def test_the_package_runs_as_a_module() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "hsslam", "--version"], capture_output=True, text=True, check=True
+    )
+    assert __version__ in done.stdout
+
+
 def test_start_up_imports_nothing_heavy() -> None:
     code = (
         "import sys, hsslam.cli.main\n"
