@@ -139,12 +139,12 @@ def draw(blocks: list[Block], path: Path) -> None:
         scans, [block.yardstick_ms for block in blocks], label="a fixed piece of work", linestyle="dotted"
     )
     whole.set(ylabel="processor time per scan (ms)", ylim=(0, None))
-    whole.legend()
+    whole.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     size = blocks[0].last_scan + 1
     for stage in sorted({stage for block in blocks for stage in block.seconds}):
         stages.plot(scans, [1e3 * block.seconds.get(stage, 0.0) / size for block in blocks], label=stage)
     stages.set(xlabel="thousand scans", ylabel="wall time per scan by stage (ms)", ylim=(0, None))
-    stages.legend()
+    stages.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     figure.savefig(path, dpi=72)
 
 
