@@ -56,6 +56,27 @@ def test_an_answer_outside_the_window_is_rejected(room, answer) -> None:
     assert result.covariance[0, 0] > 1e-9
 
 
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (None, "Oracle.estimate returned NoneType: expected hsslam.matching.Estimate"),
+        ((0.0, 0.0, 0.0), "Oracle.estimate returned tuple: expected hsslam.matching.Estimate"),
+        (Estimate(np.zeros((2, 2))), "expected three numbers"),
+        (Estimate("here"), "returned the pose 'here': expected three numbers"),
+        (Estimate(None), "returned the pose None: expected three numbers"),
+    ],
+)
+def test_an_answer_that_is_none_is_told(room, answer, said) -> None:
+    oracle = Oracle(answer)
+    with pytest.raises(TypeError, match=said):
+        oracle.match(oracle.prepare(room), room, np.zeros(3), WINDOW, np.random.default_rng(0))
+
+
+def test_three_numbers_of_any_kind_are_a_pose(room) -> None:
+    result, _ = match(Estimate([0, 0, 0]), room)
+    assert result.pose.dtype == np.float64 and result.converged
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_an_answer_that_is_not_finite_is_rejected(room, bad) -> None:
     result, _ = match((0.0, bad, 0.0), room)

@@ -279,6 +279,8 @@ class Matcher(ABC, Generic[ConfigT]):
         ------
         ValueError
             Points not of shape (N, 2), or a guess that is not three finite numbers.
+        TypeError
+            `estimate` returned no `Estimate`, or one whose pose is not three numbers.
         """
         points = clean(points)
         guess = np.ascontiguousarray(guess, dtype=np.float64)
@@ -295,7 +297,7 @@ class Matcher(ABC, Generic[ConfigT]):
                 diagnostics={"rejected": f"the {few} has fewer than {MINIMUM_POINTS} points"},
             )
         found = self.estimate(reference, points, guess, window, rng)
-        pose, converged, diagnostics = found.pose, found.converged, found.diagnostics
+        pose, converged, diagnostics = self._pose_of(found), found.converged, found.diagnostics
         covariance = found.covariance
         if not window.contains(guess, pose):
             why = LEFT_WINDOW if np.isfinite(pose).all() else "the answer is not finite"
@@ -323,6 +325,21 @@ class Matcher(ABC, Generic[ConfigT]):
             evaluations=found.evaluations,
             diagnostics=diagnostics,
         )
+
+    def _pose_of(self, found: Any) -> Pose:
+        """The pose of what `estimate` returned: plugins are not always typed."""
+        who = f"{type(self).__name__}.estimate"
+        if not isinstance(found, Estimate):
+            raise TypeError(f"{who} returned {type(found).__name__}: expected hsslam.matching.Estimate")
+        try:
+            pose = np.asarray(found.pose, dtype=np.float64)
+        except (TypeError, ValueError):
+            pose = np.empty(0)
+        if pose.shape != (3,):
+            raise TypeError(
+                f"{who} returned the pose {found.pose!r}: expected three numbers (x m, y m, theta rad)"
+            )
+        return pose
 
 
 def _is_covariance(matrix: NDArray[np.float64]) -> bool:
