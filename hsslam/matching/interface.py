@@ -334,11 +334,11 @@ class Matcher(ABC, Generic[ConfigT]):
         try:
             pose = np.asarray(found.pose, dtype=np.float64)
         except (TypeError, ValueError):
-            pose = np.empty(0)
+            pose, told = np.empty(0), repr(found.pose)
+        else:
+            told = f"of shape {pose.shape}"
         if pose.shape != (3,):
-            raise TypeError(
-                f"{who} returned the pose {found.pose!r}: expected three numbers (x m, y m, theta rad)"
-            )
+            raise TypeError(f"{who} returned a pose {told}: expected three numbers (x m, y m, theta rad)")
         return pose
 
 
