@@ -312,6 +312,38 @@ def test_a_winner_is_named_only_where_the_tests_say_so() -> None:
     assert verdict(comparison(MatcherOutcome("a", "a", {}, alike))) == ""
 
 
+def test_who_never_answered_is_not_called_unbeaten() -> None:
+    rng = np.random.default_rng(1)
+    good, none = trials(rng, 1.0, 0.0), trials(rng, 1.0, 0.0, raising=True)
+    lost = MatcherOutcome("lost", "lost", {}, failures=[Failure("trials", "it hangs")])
+    said = verdict(
+        comparison(MatcherOutcome("a", "a", {}, good), MatcherOutcome("mute", "mute", {}, none), lost)
+    )
+    assert "No single best in time: a is beaten by none." in said
+    assert "mute never gave an answer." in said
+    assert "Trials failed, see what is missing: lost." in said
+    off = trials(rng, 1.0, 1.0)
+    said = verdict(comparison(MatcherOutcome("a", "a", {}, good), MatcherOutcome("off", "off", {}, off)))
+    assert "off never succeeded." in said
+
+
+def test_few_trials_are_told_apart_from_equal_matchers() -> None:
+    rng = np.random.default_rng(1)
+
+    def few(made: MatcherTrials, count: int = 5) -> MatcherTrials:
+        data = {name: values[:count] for name, values in vars(made.data).items()}
+        return replace(made, count=count, data=replace(made.data, **data))
+
+    found = comparison(
+        MatcherOutcome("a", "a", {}, few(trials(rng, 4.0, 1.0))),
+        MatcherOutcome("b", "b", {}, few(trials(rng, 1.0, 0.0))),
+    )
+    said = verdict(found)
+    assert said.startswith("Too few trials to tell who is better: with 5 of them, none of the 4 differences")
+    assert "beaten by none" not in said
+    assert "a never succeeded." in said
+
+
 @pytest.mark.parametrize(
     ("value", "shown"),
     [(0.0, "0"), (0.01234, "0.0123"), (1.0, "1.00"), (12.345, "12.3"), (1234.5, "1234"), (-0.5, "-0.500")],

@@ -138,6 +138,16 @@ def unbeaten(found: list[Duel], measure: Measure) -> list[str]:
     return [label for label in labels if label not in beaten]
 
 
+def decidable(found: list[Duel]) -> bool:
+    """Whether there are trials enough for any difference to be significant, however large it is.
+
+    The smallest p of either test is that of N trials which all speak for the same matcher: 2^(1 - N).
+    """
+    most = max((duel.test.count for duel in found), default=0)
+    enough = bool(found) and len(found) * 2.0 ** (1 - most) < found[0].level
+    return enough or any(duel.better for duel in found)
+
+
 def succeeded(trials: MatcherTrials) -> NDArray[np.bool_]:
     """Which trials succeeded by the first definition, (T,)."""
     definition, data = trials.successes[0], trials.data

@@ -6,7 +6,16 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from hsslam_eval.comparison import Comparison, MatcherTrials
-from hsslam_eval.significance import MEASURES, Duel, Measure, duels, unbeaten, winners
+from hsslam_eval.significance import (
+    MEASURES,
+    Duel,
+    Measure,
+    decidable,
+    duels,
+    succeeded,
+    unbeaten,
+    winners,
+)
 from hsslam_eval.tables import Cell, Row, Table, limit_text, measured, missing, number, spread
 
 _ERRORS = ["displacement mean (cm)", "displacement median (cm)", "rotation mean (°)", "rotation median (°)"]
@@ -74,11 +83,17 @@ def trial_tables(comparison: Comparison) -> list[Table]:
 
 
 def verdict(comparison: Comparison) -> str:
-    """Who is ahead in the trials: named only where it is significantly better than every other one."""
+    """Who is ahead in the trials: named only where it is significantly better than every other one.
+
+    A matcher that never answered or never succeeded is called so, and never one that is beaten by none.
+    """
     found = duels(comparison)
     if not found:
         return ""
     best, level = winners(found), found[0].level
+    trials = {m.label: m.trials for m in comparison.matchers if m.trials is not None}
+    silent = [label for label, of in trials.items() if sum(of.unanswered.values()) == of.count]
+    failed = [label for label, of in trials.items() if not succeeded(of).any() and label not in silent]
     what: dict[Measure, tuple[str, str]] = {
         "success": ("succeeds more often than every other matcher", "success"),
         "displacement": ("has smaller displacement errors than every other matcher", "displacement error"),
@@ -86,15 +101,30 @@ def verdict(comparison: Comparison) -> str:
         "time": ("is faster than every other matcher", "time"),
     }
     parts = []
-    for measure in MEASURES:
-        claim, name = what[measure]
-        if measure in best:
-            parts.append(f"{best[measure]} {claim}.")
-        else:
-            first = unbeaten(found, measure)
+    if not decidable(found):
+        most = max(duel.test.count for duel in found)
+        parts.append(
+            f"Too few trials to tell who is better: with {most} of them, none of the {len(found)} differences "
+            "tested could be significant."
+        )
+    else:
+        for measure in MEASURES:
+            claim, name = what[measure]
+            if measure in best:
+                parts.append(f"{best[measure]} {claim}.")
+                continue
+            out = {*silent, *failed} if measure == "success" else {*silent}
+            first = [label for label in unbeaten(found, measure) if label not in out]
             parts.append(
                 f"No single best in {name}: {_listed(first)} {'are' if len(first) > 1 else 'is'} beaten by none."
             )
+    if failed:
+        parts.append(f"{_listed(failed)} never succeeded.")
+    if silent:
+        parts.append(f"{_listed(silent)} never gave an answer.")
+    lost = [m.label for m in comparison.matchers if any(failure.stage == "trials" for failure in m.failures)]
+    if lost:
+        parts.append(f"Trials failed, see what is missing: {_listed(lost)}.")
     return f"{' '.join(parts)} (Paired tests, corrected p < {level:.2g}.)"
 
 
