@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import event
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -22,3 +24,28 @@ def kernel(function: _F) -> _F:
         return cast(_F, numba.njit(cache=True, **options)(function))
     except RuntimeError:  # no folder that a cache could lie in; `hsslam doctor` tells what mends that
         return cast(_F, numba.njit(**options)(function))
+
+
+@contextmanager
+def watch_compiler(tell: Callable[[bool], None]) -> Iterator[None]:
+    """Call ``tell`` with True where numba begins to compile while the block runs, and with False where it ends."""
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        depth = 0  # a kernel compiles the kernels it calls
+
+        def on_start(self, event: Any) -> None:
+            self.depth += 1
+            if self.depth == 1:
+                tell(True)
+
+        def on_end(self, event: Any) -> None:
+            self.depth -= 1
+            if self.depth == 0:
+                tell(False)
+
+    listener = Listener()
+    event.register("numba:compile", listener)
+    try:
+        yield
+    finally:
+        event.unregister("numba:compile", listener)

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,8 +15,11 @@ import pytest
 from hsslam import plugin_files
 from hsslam.errors import ConfigError
 from hsslam_eval.compare import CompareConfig, DatasetSpec, compare
+from hsslam_eval.compare_config import LimitSection
 from hsslam_eval.comparison import Comparison, MatcherOutcome
+from hsslam_eval.jobs import JOB_FILE, Job
 from hsslam_eval.report import write_report
+from hsslam_eval.supervise import supervise
 from hsslam_eval.workspace import Workspace
 
 PLUGIN = '''
@@ -202,6 +209,49 @@ def test_a_matcher_that_hangs_is_given_up(
     assert said in failure.reason
     assert "in misbehave (nasty.py:" in failure.reason
     assert "its last line: going to bed" in failure.reason
+
+
+def test_compiling_is_no_step_of_the_matcher(tmp_path: Path) -> None:
+    worker = tmp_path / "compiles.py"
+    worker.write_text(
+        "import json, os, sys, time\n"
+        "with os.fdopen(int(sys.argv[-1]), 'w', buffering=1) as out:\n"
+        "    tell = lambda **said: print(json.dumps(said), file=out)\n"
+        "    tell(compiling=True); time.sleep(1.5); tell(compiling=False)\n"
+        "    time.sleep(float(sys.argv[1]))\n"
+    )
+    # -P keeps the current folder off the path of the worker; only an installed name or PYTHONPATH is found.
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *sys.path]))
+        limits = LimitSection(step=1.0)
+        assert supervise("compiles", ["0"], tmp_path / "log.txt", limits, lambda message: None) == ""
+        said = supervise("compiles", ["30"], tmp_path / "log.txt", limits, lambda message: None)
+    assert "took no step for 1 s (limits.step)" in said
+
+
+def test_a_worker_tells_of_compiling(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plugin = tmp_path / "compiles.py"
+    plugin.write_text(
+        "import numba\n"
+        "from hsslam.matching import Estimate, Matcher\n"
+        "class Compiles(Matcher):\n"
+        "    def estimate(self, reference, points, guess, window, rng):\n"
+        "        return Estimate(numba.njit(lambda pose: pose)(guess))\n"
+    )
+    monkeypatch.setenv(plugin_files.VARIABLE, "")
+    plugin_files.use(plugin)
+    of = {"count": 1, "warm_up": 0, "resamples": 100}
+    job = Job.model_validate(
+        {"kind": "trials", "dataset": DATASET, "matcher": {"name": "compiles"}, "trials": of}
+    )
+    (tmp_path / JOB_FILE).write_text(job.model_dump_json())
+    reading, writing = os.pipe()
+    command = [sys.executable, "-m", "hsslam_eval.worker", str(tmp_path), str(writing)]
+    with os.fdopen(reading) as told:
+        subprocess.run(command, pass_fds=[writing], check=True, capture_output=True)
+        os.close(writing)
+        said = [message["compiling"] for line in told if "compiling" in (message := json.loads(line))]
+    assert said and said == [True, False] * (len(said) // 2)
 
 
 def test_limits_may_change_but_not_the_plugin(tmp_path: Path, nasty_plugin: Path) -> None:

@@ -38,7 +38,8 @@ def supervise(
     Parameters
     ----------
     module : str
-        The worker: writes JSON objects, one a line, to the file descriptor that its last argument names.
+        The worker: writes JSON objects, one a line, to the file descriptor that its last argument names. Between
+        ``{"compiling": true}`` and ``{"compiling": false}`` the time of a step stands still.
     arguments : sequence of str
         Its other arguments.
     log : path
@@ -77,11 +78,14 @@ def supervise(
     os.close(writing)
     gave_up = ""
     began = heard = monotonic()
+    compiling = False
     try:
         for message in _messages(reading, process):
             listener(message)
             now = monotonic()
-            heard = now if message else heard
+            compiling = bool(message.get("compiling", compiling))
+            # The compiler's time is not the matcher's: on a fresh machine it may take longer than any step.
+            heard = now if message or compiling else heard
             if limits.step and now - heard > limits.step:
                 gave_up = f"took no step for {limits.step:g} s (limits.step) and was ended"
             elif limits.total and now - began > limits.total:

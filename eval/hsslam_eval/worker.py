@@ -22,6 +22,7 @@ from typing import Any
 from hsslam.config import Config
 from hsslam.datasets.dataset import Dataset
 from hsslam.errors import DataError, HsslamError, MatcherUnavailableError
+from hsslam.jit import watch_compiler
 from hsslam_eval.comparison import Failure, MatcherTrials, SlamOutcome
 from hsslam_eval.jobs import RESULT_FILE, RUN_FOLDER, Job
 from hsslam_eval.orphans import end_with_parent
@@ -44,6 +45,10 @@ class Reporter:
         if now - self._last >= _REPORT_EVERY or done in (0, total):
             self._last = now
             self._line({"stage": stage, "done": done, "total": total})
+
+    def compiling(self, begins: bool) -> None:
+        """Say that numba begins or ends to compile, which is no step of the matcher's."""
+        self._line({"compiling": begins})
 
     def failure(self, failure: Failure) -> None:
         """Say why there will be no result."""
@@ -143,10 +148,11 @@ def main(arguments: list[str]) -> int:
         job = Job.load(folder)
         stage, seed = job.kind, job.seed
         record: MatcherTrials | SlamOutcome
-        if job.kind == "trials":
-            record = run_trials_job(job, reporter)
-        else:
-            record = run_slam_job(job, folder / RUN_FOLDER, reporter)
+        with watch_compiler(reporter.compiling):
+            if job.kind == "trials":
+                record = run_trials_job(job, reporter)
+            else:
+                record = run_slam_job(job, folder / RUN_FOLDER, reporter)
         write_record(folder / RESULT_FILE, record)
     except MatcherUnavailableError as error:
         reporter.failure(Failure("unavailable", error.reason, error.remedy, seed))

@@ -186,26 +186,10 @@ def progress(quiet: bool = False) -> Iterator[Progress]:
 @contextmanager
 def watch_compiler(shown: Progress) -> Iterator[None]:
     """Tell ``shown`` when numba compiles while the block runs: kernels come from its cache after the first run."""
-    from numba.core import event
+    from hsslam import jit
 
-    class Listener(event.Listener):  # type: ignore[misc]
-        depth = 0  # a kernel compiles the kernels it calls
-
-        def on_start(self, event: Any) -> None:
-            self.depth += 1
-            shown.compiling(True)
-
-        def on_end(self, event: Any) -> None:
-            self.depth -= 1
-            if self.depth == 0:
-                shown.compiling(False)
-
-    listener = Listener()
-    event.register("numba:compile", listener)
-    try:
+    with jit.watch_compiler(shown.compiling):
         yield
-    finally:
-        event.unregister("numba:compile", listener)
 
 
 def _clock(seconds: float) -> str:
