@@ -118,6 +118,17 @@ def test_a_run_that_died_is_a_row_with_its_remedy(runs: Path, tmp_path: Path) ->
     assert f"hsslam run --resume {died}" in (tmp_path / "page" / "report.md").read_text()
 
 
+def test_the_command_tells_of_a_run_that_died(runs: Path, tmp_path: Path) -> None:
+    died = tmp_path / "died"
+    died.mkdir()
+    for name in ("config.yaml", "environment.json", "journal.jsonl"):
+        shutil.copy(runs / "hide" / name, died / name)
+    said = hsslam("report", died, "--out", tmp_path / "page")
+    assert f"hide: SLAM failed: the run in {died} is not complete" in said
+    assert f"to mend it: hsslam run --resume {died}" in said
+    assert f"`hsslam run --resume {died}` completes it" in complains("convert", died, tmp_path / "died.tum")
+
+
 def test_a_trajectory_alone_needs_its_log(runs: Path, tmp_path: Path) -> None:
     file = runs / "gmapping.tum"
     assert "which log" in complains("report", file, "--out", tmp_path / "a")

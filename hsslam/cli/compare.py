@@ -293,11 +293,16 @@ def resolve(
 
 def tables(comparison: Comparison) -> None:
     """Print the report's tables."""
+    from hsslam_eval.report_text import problems
     from hsslam_eval.slam_tables import slam_tables
     from hsslam_eval.trial_tables import trial_tables, verdict
 
     # What the page has beyond these is too wide or too long for a terminal.
     shown = [t for t in (*trial_tables(comparison), *slam_tables(comparison)) if t.name not in _PAGE_ONLY]
+    # A table tells of what is missing in it; where nothing was done there is none.
+    for problem in [] if shown else problems(comparison):
+        remedy = f"; to mend it: {problem.remedy}" if problem.remedy else ""
+        console.say(f"{problem.label}: {problem.what}: {problem.reason}{remedy}")
     for table in shown:
         console.say(f"\n{table.title}")
         console.table(

@@ -250,6 +250,10 @@ def _bag_in_folder(path: Path) -> str:
         there = sorted(p.name for s in (".db3", ".mcap", ".bag") for p in path.glob(f"*{s}"))
         if (path / "trajectory.tum").is_file():
             hint = "it is a run folder; name the log that was run"
+        elif (path / "journal.jsonl").is_file():
+            hint = (
+                f"it is the folder of a run that was ended early; `hsslam run --resume {path}` completes it"
+            )
         elif there:
             hint = f"name the file in it, e.g. {path / there[0]}"
         else:
