@@ -28,6 +28,7 @@ from hsslam_eval.comparison import (
     SlamOutcome,
     Study,
 )
+from hsslam_eval.figures import trial_pictures
 from hsslam_eval.outcomes import trials_record
 from hsslam_eval.report import write_report
 from hsslam_eval.slam_tables import slam_tables
@@ -325,6 +326,18 @@ def test_who_never_answered_is_not_called_unbeaten() -> None:
     off = trials(rng, 1.0, 1.0)
     said = verdict(comparison(MatcherOutcome("a", "a", {}, good), MatcherOutcome("off", "off", {}, off)))
     assert "off never succeeded." in said
+
+
+def test_who_never_answered_is_no_point_of_error_against_time() -> None:
+    rng = np.random.default_rng(1)
+    mute = trials(rng, 1.0, 0.0)
+    mute = replace(mute, unanswered={"the answer is not finite": mute.count})
+    found = comparison(
+        MatcherOutcome("a", "a", {}, trials(rng, 1.0, 0.0)), MatcherOutcome("mute", "mute", {}, mute)
+    )
+    picture = next(p for p in trial_pictures(found, "x") if p.key == "x-pareto")
+    assert "Not shown, because it never gave an answer: mute." in picture.caption
+    assert b"mute" not in picture.files["svg"]
 
 
 def test_few_trials_are_told_apart_from_equal_matchers() -> None:

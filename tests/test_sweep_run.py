@@ -22,6 +22,7 @@ from typer.testing import CliRunner
 from hsslam import plugin_files
 from hsslam.cli.main import app
 from hsslam_eval import sweep_pool
+from hsslam_eval.sweep_table import Row, read_tables
 
 PATIENCE = 240.0
 """No test waits that long (s) unless something is broken, however slow the machine."""
@@ -183,6 +184,13 @@ def test_the_table_has_the_same_rows(local: Path) -> None:
         float(table[1]["ate_translation_rmse_m"])
         == rows(local / "out")[1]["metrics"]["ate_translation_rmse_m"]
     )
+
+
+def test_trials_without_an_answer_are_counted_beside_the_errors(local: Path) -> None:
+    done = next(row for row in rows(local / "out") if row["kind"] == "trials" and row["status"] == "done")
+    mute = Row(**{**done, "metrics": {**done["metrics"], "unanswered": 2}})
+    ((_, headings, (cells,)),) = read_tables([mute])
+    assert cells[headings.index("no answer")] == "2"
 
 
 def test_a_job_that_fails_is_a_row_with_its_reason(local: Path) -> None:

@@ -71,7 +71,11 @@ def trial_pictures(comparison: Comparison, prefix: str) -> list[Picture]:
             _scaled(found.seconds.median, 1e3), _scaled(found.displacement_all_m.median, 100.0)
         )
         for label, found in trials.items()
+        # The error of one that never answered is that of the guess; as a point it would be the cheapest of all.
+        if sum(found.unanswered.values()) < found.count
     }
+    mute = [label for label in trials if label not in points]
+    absent = f" Not shown, because it never gave an answer: {', '.join(mute)}." if mute else ""
     guess = {
         label: np.array(found.data.initial_displacement_m, dtype=np.float64) * 100.0
         for label, found in trials.items()
@@ -95,7 +99,7 @@ def trial_pictures(comparison: Comparison, prefix: str) -> list[Picture]:
         _picture(
             f"{prefix}-pareto",
             f"Error against time: median displacement error over all trials and median time per match, with {percent} "
-            "bootstrap intervals. Further down and left is better; log scales.",
+            f"bootstrap intervals. Further down and left is better; log scales.{absent}",
             trial_plots.pareto(
                 points,
                 looks,

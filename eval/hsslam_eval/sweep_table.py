@@ -173,6 +173,7 @@ def read_tables(rows: Sequence[Row]) -> list[tuple[str, list[str], list[list[str
 _TRIALS = (
     ("success", "10cm_2deg_ratio", "{:.1%}"),
     ("glasm success", "glasm_ratio", "{:.1%}"),
+    ("no answer", "unanswered", "{:d}"),
     ("median error (m)", "all_displacement_median_m", "{:.4f}"),
     ("(deg)", "all_rotation_median_deg", "{:.3f}"),
     ("match (s)", "time_median_s", "{:.5f}"),
