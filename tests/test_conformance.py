@@ -269,3 +269,15 @@ def test_an_exemption_that_names_no_check_is_an_error() -> None:
 def test_parametrize_with_checks_gives_one_test_per_promise(matcher, check) -> None:
     assert isinstance(matcher, Hide)
     assert check in CHECKS.values()
+
+
+class NotFinite(Hide):
+    summary = "never finds anything"
+
+    def estimate(self, reference, points, guess, window, rng):
+        return Estimate(np.full(3, np.nan))
+
+
+def test_answers_that_are_rejected_are_called_so() -> None:
+    with pytest.raises(AssertionError, match="answers were rejected: the answer is not finite"):
+        check_matcher(NotFinite(), exempt=["score"])

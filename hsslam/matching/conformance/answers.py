@@ -67,7 +67,7 @@ def check_covariance(matcher: Matcher[Any]) -> None:
 
 def check_accuracy(matcher: Matcher[Any]) -> None:
     """Most guesses in an easy room lead to its truth."""
-    distances, rotations = [], []
+    distances, rotations, rejected = [], [], []
     for trial in range(TRIALS):
         room = room_pair(trial)
         guess = guesses(room.truth, WINDOW.half, 1, trial)[0]
@@ -75,6 +75,12 @@ def check_accuracy(matcher: Matcher[Any]) -> None:
         distance, rotation = apart(result.pose, room.truth)
         distances.append(distance)
         rotations.append(rotation)
+        rejected += [result.diagnostics["rejected"]] if "rejected" in result.diagnostics else []
+    # A rejected answer is the guess: how far that is from the truth says nothing of the matcher.
+    require(
+        2 * len(rejected) < TRIALS,
+        f"{len(rejected)} of {TRIALS} answers were rejected: {', '.join(set(rejected))}",
+    )
     require_close(distances, rotations, "from the truth")
 
 
