@@ -2,4 +2,6 @@
 
 from hsslam.cli.main import main
 
-main()
+# Processes that a sweep starts import this module, too.
+if __name__ == "__main__":
+    main()
