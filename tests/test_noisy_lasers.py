@@ -17,8 +17,8 @@ from hsslam.datasets.simulator import (
     SimulatedDataset,
 )
 from hsslam.datasets.simulator.solids import room
-from hsslam.kernels.lines import noise_of
-from hsslam.kernels.surface import GAP, Surface
+from hsslam.kernels.lines import ARM, ENOUGH, LONG, MEDIAN, PLENTY, fit_line, noise_of
+from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, GAP, Surface
 from hsslam.se2 import Points, between_many
 from hsslam.slam.pipeline import Slam
 
@@ -45,6 +45,51 @@ def tilts(points: Points) -> NDArray[np.float64]:
 @pytest.mark.parametrize("spacing", [0.02, 0.05, 0.12])
 def test_noise_is_told_from_the_returns(noise: float, spacing: float) -> None:
     assert noise_of(wall(noise, spacing), GAP) == pytest.approx(noise, rel=0.5)
+
+
+def noise_twin(points: Points, arm: float) -> float:
+    """By NumPy: median distance from chords to the first returns ``arm`` away on either side of an unbroken surface."""
+    found = []
+    for i in range(1, len(points) - 1, 1 + len(points) // PLENTY):
+        away = np.linalg.norm(points - points[i], axis=1) > arm
+        before, after = np.flatnonzero(away[:i]), np.flatnonzero(away[i:])
+        a, b = points[before[-1] if len(before) else 0], points[i + after[0] if len(after) else -1]
+        length = np.linalg.norm(b - a)
+        if length < arm:
+            continue
+        t = (points[i] - a) @ (b - a) / length**2
+        if 0.1 < t < 0.9:
+            across = abs((points[i] - a) @ np.array([a[1] - b[1], b[0] - a[0]])) / length
+            found.append(across / math.sqrt(1.0 + t * t + (1.0 - t) * (1.0 - t)))
+    return float(np.median(found)) / MEDIAN if len(found) >= ENOUGH else 0.0
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.005, 0.02, 0.05])
+@pytest.mark.parametrize("spacing", [0.02, 0.05, 0.12])
+def test_noise_agrees_with_numpy(noise: float, spacing: float) -> None:
+    points = wall(noise, spacing)
+    expected = noise_twin(points, ARM)
+    if expected > LONG * ARM:
+        expected = min(expected, noise_twin(points, expected / LONG))
+    assert noise_of(points, GAP) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.0, 2.5, -2.0])
+def test_lines_agree_with_numpy(turn: float) -> None:
+    """Of a quiet wall: the short axis of the returns within half a span of each segment's middle."""
+    c, s = math.cos(turn), math.sin(turn)
+    points = wall(0.002, 0.02) @ np.array([[c, s], [-s, c]])
+    line = np.empty(6)
+    for i in range(0, len(points) - 1, 7):
+        fit_line(points, i, GAP, FIT_SPAN, FIT_ROUGHNESS, 0.002, line)
+        middle = 0.5 * (points[i] + points[i + 1])
+        near = points[np.linalg.norm(points - middle, axis=1) <= 0.5 * FIT_SPAN]
+        _, scatter, axes = np.linalg.svd(near - near.mean(axis=0))
+        normal = np.array([-axes[0, 1], axes[0, 0]]) * np.sign(axes[0] @ (points[-1] - points[0]))
+        assert line[:2] == pytest.approx(near.mean(axis=0), abs=1e-9)
+        assert line[2:4] == pytest.approx(normal, abs=1e-6)
+        assert line[4] == pytest.approx(1.0 / scatter[0] ** 2)
+        assert line[5] == pytest.approx(scatter[1] ** 2 / (len(near) - 2), abs=1e-12)
 
 
 def test_corners_are_no_noise() -> None:

@@ -34,7 +34,6 @@ WIDENINGS = 3
 SAME = 1.5
 """Returns of a plain surface stray from its line by no more than this many standard deviations of the noise (rms)."""
 
-
 VAGUE = 0.35
 """Standard deviation (rad) of a line's direction, from which on it points nowhere."""
 
