@@ -56,7 +56,7 @@ def write_g2o(path: Path | str, poses: Poses, edges: Iterable[GraphEdge]) -> Non
         for i, j, (x, y, theta), covariance in edges:
             turn = _turn(theta)
             information = np.linalg.inv(turn.T @ covariance @ turn)
-            upper = " ".join(f"{value:.9g}" for value in (0.5 * (information + information.T))[_UPPER])
+            upper = " ".join(f"{value:.12g}" for value in (0.5 * (information + information.T))[_UPPER])
             out.write(f"EDGE_SE2 {i} {j} {x:.9f} {y:.9f} {theta:.9f} {upper}\n")
 
 
