@@ -121,3 +121,29 @@ def test_a_scan_that_sees_nothing_known_stays_where_it_was() -> None:
     )
     assert matched.tolist() == [True, False]
     np.testing.assert_allclose(found[1], compose(office.poses[0], relative))
+
+
+def test_a_person_who_walks_along_does_not_draw_a_scan_away() -> None:
+    # A corridor whose far end tells how far the robot is, and a person one metre ahead of it in every scan, who is
+    # more of the scan than the corridor's end: 14 cm on, the person fits best where the robot was.
+    along = np.linspace(-3.0, 6.0, 181)
+    end = np.column_stack((np.full(20, 6.0), np.linspace(-0.95, 0.95, 20)))
+    arc = np.linspace(0.6 * math.pi, 1.4 * math.pi, 36)
+    person = np.array([1.2, 0.0]) + 0.25 * np.column_stack((np.cos(arc), np.sin(arc)))[::-1]
+    walls = [np.column_stack((along, np.full(181, -1.0))), np.column_stack((along[::-1], np.full(181, 1.0)))]
+
+    def seen_from(x: float) -> Array:
+        return np.concatenate((walls[0] - [x, 0.0], person, end - [x, 0.0], walls[1] - [x, 0.0]))
+
+    relative = pose(0.145, 0.0, 0.0)
+    found, _, matched = match_scans(
+        Config(),
+        create("hide"),
+        [seen_from(0.0)],
+        np.zeros((1, 3)),
+        [seen_from(0.0).astype(np.float32), seen_from(0.145).astype(np.float32)],
+        np.zeros(2, dtype=np.int64),
+        np.array([np.zeros(3), relative]),
+    )
+    assert matched.all()
+    np.testing.assert_allclose(found[1], relative, atol=0.01)

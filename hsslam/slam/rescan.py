@@ -13,15 +13,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import Config
-from hsslam.matching.interface import Matcher, SearchWindow
-from hsslam.se2 import Points, Pose, Poses, between, compose
+from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
+from hsslam.se2 import Points, Pose, Poses, between, compose, wrap
 from hsslam.slam.factors import FLOOR_STD_THETA, FLOOR_STD_XY
 from hsslam.slam.fusion import rotated
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.submap import merge
+from hsslam.slam.windows import AGREEING, known_within
 
 BLOCK = 4
 """Keyframes in a row whose scans are matched against the same submap."""
+
+AWAY = (0.02, math.radians(1.0))
+"""A match this far (m, rad) from where the scan was tracked is tried against a match right there."""
+
+STAYING = (0.006, math.radians(0.5))
+"""A match right there that is no further off than this (m, rad) confirms that the scan belongs there."""
+
+STAYING_GAIN = 0.05
+"""What was tracked and confirmed is given up only for a score that is this much higher."""
 
 
 def surrounding(poses: Poses, first: int, last: int, radius: float, most: int) -> NDArray[np.int64]:
@@ -90,11 +100,37 @@ def match_scans(
             expected = compose(poses[anchors[i]], relatives[i])
             guess = between(origin, expected)
             rng = generator(config.seed, Purpose.SCAN, i)
-            result = matcher.match(reference, scans[i].astype(np.float64), guess, window, rng)
+            points = scans[i].astype(np.float64)
+            result = matcher.match(reference, points, guess, window, rng)
+            if _apart(result.pose, guess, AWAY):
+                result = _unless_confirmed(matcher, reference, points, guess, window, result, rng)
             matched[i] = result.converged and result.score >= rules.overlap_min_score
             found[i] = compose(origin, result.pose) if matched[i] else expected
             covariances[i] = rotated(result.covariance, -origin[2])
     return found, covariances, matched
+
+
+def _unless_confirmed(
+    matcher: Matcher[Any],
+    reference: Reference,
+    points: Points,
+    tracked: Pose,
+    window: SearchWindow,
+    found: MatchResult,
+    rng: np.random.Generator,
+) -> MatchResult:
+    """What was found, unless the scan fits about as well where it was tracked: people and clutter draw it away."""
+    near = matcher.match(reference, points, tracked, AGREEING, rng)
+    lower = near.score < found.score - STAYING_GAIN
+    if not near.converged or lower or _apart(near.pose, tracked, STAYING):
+        return found
+    return known_within(matcher, window, reference, points, near)
+
+
+def _apart(pose: Pose, other: Pose, least: tuple[float, float]) -> bool:
+    """Whether two poses differ by more than a distance (m) or an angle (rad)."""
+    x, y, theta = pose - other
+    return math.hypot(x, y) > least[0] or abs(wrap(theta)) > least[1]
 
 
 def smooth(

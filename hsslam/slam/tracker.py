@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import Config
-from hsslam.kernels.assess import assess
 from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
 from hsslam.scan import LaserScan
 from hsslam.se2 import Points, Pose, between, compose, wrap
@@ -19,7 +18,7 @@ from hsslam.slam.motion import MotionModel
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import LocalSubmap
-from hsslam.slam.windows import foreseen_window, match_within, search_window
+from hsslam.slam.windows import AGREEING, foreseen_window, known_within, match_within, search_window
 
 EDGE = 0.9
 """An answer this far from the middle of the window, as a share of its half side, may be the edge of a better one."""
@@ -35,9 +34,6 @@ USUAL = 0.05
 
 FORGETTING = 0.1
 """Share of the newest score in what is usual."""
-
-AGREEING = SearchWindow(0.04, 0.04, math.radians(2.0))
-"""Window around odometry's prediction in which an answer agrees with it, at least."""
 
 RECOVERY_GAIN = 0.12
 """Odometry is overruled only by an answer whose score is this much higher: people who walk along see no motion."""
@@ -212,7 +208,9 @@ class Tracker:
         if not near.converged or near.score <= first.score - RECOVERY_GAIN:
             return replace(first, evaluations=evaluations)
         # What so narrow a window adds to the covariance is odometry's, and odometry is weighed by itself.
-        return self._known_within(self._window, reference, points, replace(near, evaluations=evaluations))
+        return known_within(
+            self._matcher, self._window, reference, points, replace(near, evaluations=evaluations)
+        )
 
     def _recover(
         self, reference: Reference, points: Points, first: MatchResult, rng: np.random.Generator
@@ -242,16 +240,9 @@ class Tracker:
         evaluations += near.evaluations
         if not near.converged or near.score < found.score - EDGE_GAIN:
             return replace(found, evaluations=evaluations)
-        return self._known_within(self._widest, reference, points, replace(near, evaluations=evaluations))
-
-    def _known_within(
-        self, window: SearchWindow, reference: Reference, points: Points, result: MatchResult
-    ) -> MatchResult:
-        """A match with its covariance in another window, which tells where the points leave a direction open."""
-        _, covariance, _ = assess(
-            reference.surface, points, result.pose, window.half, self._matcher.config.score_distance
+        return known_within(
+            self._matcher, self._widest, reference, points, replace(near, evaluations=evaluations)
         )
-        return replace(result, covariance=covariance)
 
 
 def _at_edge(off: Pose, window: SearchWindow) -> bool:

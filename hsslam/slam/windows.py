@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from hsslam.config import WindowSection
+from hsslam.kernels.assess import assess
 from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
 from hsslam.se2 import Points, Pose
 from hsslam.slam.recovery import match_tiles
 
 SIGMAS = 3.0
 """A window reaches this many standard deviations to either side."""
+
+AGREEING = SearchWindow(0.04, 0.04, math.radians(2.0))
+"""Window around a prediction in which an answer agrees with it, at least."""
 
 
 def search_window(section: WindowSection) -> SearchWindow:
@@ -46,6 +51,16 @@ def match_within(
     if matcher.covers_window or bool((window.half <= tile.half).all()):
         return matcher.match(reference, points, guess, window, rng)
     return match_tiles(matcher, reference, points, guess, window, tile, rng)
+
+
+def known_within(
+    matcher: Matcher[Any], window: SearchWindow, reference: Reference, points: Points, result: MatchResult
+) -> MatchResult:
+    """A match with its covariance in another window, which tells where the points leave a direction open."""
+    _, covariance, _ = assess(
+        reference.surface, points, result.pose, window.half, matcher.config.score_distance
+    )
+    return replace(result, covariance=covariance)
 
 
 def _between(value: float, least: float, most: float) -> float:
