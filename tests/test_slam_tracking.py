@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -108,3 +109,28 @@ def test_people_who_walk_along_do_not_stop_the_robot() -> None:
         event = slam.process(replace(scan, index=index, stamp=0.3 * index, odometry=truth))[0]
     assert isinstance(event, Tracked)
     assert event.pose == pytest.approx(truth, abs=0.1)
+
+
+def colonnade(end: float) -> NDArray[np.float64]:
+    """Walls (N, 4) m of a corridor along x with a pillar every 24 cm on either side, closed at its end."""
+    walls = [[end, -1.2, end, 1.2]]
+    for side in (-1.0, 1.0):
+        walls.append([-4.0, 1.2 * side, end, 1.2 * side])
+        for x in np.arange(-4.2, end, 0.24):
+            corners = [(x, 1.2 * side), (x, side), (x + 0.1, side), (x + 0.1, 1.2 * side)]
+            walls.extend([*a, *b] for a, b in pairwise(corners))
+    return np.array(walls)
+
+
+def test_a_robot_that_goes_on_steadily_does_not_leap_to_where_more_fits() -> None:
+    """A door that shuts 24 cm before the corridor's end: among like pillars, 24 cm on fits better."""
+    geometry = ScanGeometry(-math.pi / 2, math.radians(0.5))
+    rng = np.random.default_rng(0)
+    slam = Slam(load_config())
+    for i in range(14):
+        truth = pose(0.1 * i, 0.0, 0.0)
+        ranges = raycast(colonnade(4.5 if i < 10 else 4.26), truth, geometry, 361)
+        ranges += 0.005 * rng.standard_normal(361)
+        (event, *_) = slam.process(LaserScan(float(i), ranges, geometry, truth, index=i))
+        assert isinstance(event, Tracked)
+        assert event.pose == pytest.approx(truth, abs=0.1), f"scan {i}"

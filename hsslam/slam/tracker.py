@@ -38,6 +38,9 @@ FORGETTING = 0.1
 RECOVERY_GAIN = 0.12
 """Odometry is overruled only by an answer whose score is this much higher: people who walk along see no motion."""
 
+STEADY = 2.0
+"""And this many times as much where odometry goes on as the robot went, and the answer does not: robots do not leap."""
+
 
 @dataclass(frozen=True, eq=False)
 class TrackedScan:
@@ -205,12 +208,18 @@ class Tracker:
         window = foreseen_window(max(prior[0, 0], prior[1, 1]), prior[2, 2], AGREEING, self._window)
         near = self._matcher.match(reference, points, predicted, window, rng)
         evaluations = first.evaluations + near.evaluations
-        if not near.converged or near.score <= first.score - RECOVERY_GAIN:
+        gain = RECOVERY_GAIN * (STEADY if self._steadier(predicted, first.pose) else 1.0)
+        if not near.converged or near.score <= first.score - gain:
             return replace(first, evaluations=evaluations)
         # What so narrow a window adds to the covariance is odometry's, and odometry is weighed by itself.
         return known_within(
             self._matcher, self._window, reference, points, replace(near, evaluations=evaluations)
         )
+
+    def _steadier(self, predicted: Pose, found: Pose) -> bool:
+        """Whether odometry's motion is more like the last motion than what was found is."""
+        repeated = compose(self._pose, self._motion.last_motion)
+        return _way(predicted, repeated) < _way(found, repeated)
 
     def _recover(
         self, reference: Reference, points: Points, first: MatchResult, rng: np.random.Generator
@@ -247,6 +256,12 @@ class Tracker:
 
 def _at_edge(off: Pose, window: SearchWindow) -> bool:
     return bool((np.abs(off) > EDGE * window.half).any())
+
+
+def _way(start: Pose, end: Pose) -> float:
+    """Way from a pose to another (m + rad)."""
+    x, y, theta = end - start
+    return math.hypot(x, y) + abs(wrap(theta))
 
 
 def _contradicts(result: MatchResult, predicted: Pose, prior: NDArray[np.float64]) -> bool:
