@@ -157,7 +157,7 @@ class Tracker:
                 result = self._agree(reference, points, predicted, prior, result, rng)
         if not result.converged or result.score < rules.recovery_score:
             with self._stopwatch.measure("recover"):
-                result = self._recover(reference, points, result, rng)
+                result = self._recover(reference, points, predicted, told, result, rng)
         matched = result.converged and result.score >= rules.min_score
         if not matched:
             pose, covariance = predicted, prior
@@ -208,21 +208,27 @@ class Tracker:
         window = foreseen_window(max(prior[0, 0], prior[1, 1]), prior[2, 2], AGREEING, self._window)
         near = self._matcher.match(reference, points, predicted, window, rng)
         evaluations = first.evaluations + near.evaluations
-        gain = RECOVERY_GAIN * (STEADY if self._steadier(predicted, first.pose) else 1.0)
-        if not near.converged or near.score <= first.score - gain:
+        if not near.converged or near.score <= first.score - self._least_gain(predicted, first.pose):
             return replace(first, evaluations=evaluations)
         # What so narrow a window adds to the covariance is odometry's, and odometry is weighed by itself.
         return known_within(
             self._matcher, self._window, reference, points, replace(near, evaluations=evaluations)
         )
 
-    def _steadier(self, predicted: Pose, found: Pose) -> bool:
-        """Whether odometry's motion is more like the last motion than what was found is."""
+    def _least_gain(self, predicted: Pose, found: Pose) -> float:
+        """By how much an answer must score higher to overrule odometry: more, if odometry went on as the robot went."""
         repeated = compose(self._pose, self._motion.last_motion)
-        return _way(predicted, repeated) < _way(found, repeated)
+        steadier = _way(predicted, repeated) < _way(found, repeated)
+        return STEADY * RECOVERY_GAIN if steadier else RECOVERY_GAIN
 
     def _recover(
-        self, reference: Reference, points: Points, first: MatchResult, rng: np.random.Generator
+        self,
+        reference: Reference,
+        points: Points,
+        predicted: Pose,
+        told: bool,
+        first: MatchResult,
+        rng: np.random.Generator,
     ) -> MatchResult:
         """Doubt odometry: try the last motion once more as the prediction, then a wide window around it."""
         rules = self._config.tracker
@@ -232,7 +238,8 @@ class Tracker:
         if not best.converged or best.score < rules.recovery_score:
             best = match_within(self._matcher, reference, points, repeated, self._widest, self._window, rng)
             evaluations += best.evaluations
-        if best.converged and (not first.converged or best.score > first.score + RECOVERY_GAIN):
+        gain = self._least_gain(predicted, best.pose) if told else RECOVERY_GAIN
+        if best.converged and (not first.converged or best.score > first.score + gain):
             return self._settled(reference, points, best, evaluations, rng)
         return replace(first, evaluations=evaluations)
 
