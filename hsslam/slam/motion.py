@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hsslam.config import GraphSection
 from hsslam.scan import LaserScan
-from hsslam.se2 import Pose, between
+from hsslam.se2 import Pose, between, wrap
 
 SILENT_AFTER = 2
 """Odometry is silent when it has not changed over this many scans while the matches moved."""
@@ -17,9 +17,18 @@ SILENT_AFTER = 2
 MOVING = 0.02
 """A match that moved by this much (m, or m + rad) moved."""
 
+LEAP = 0.2
+"""Odometry leaps when its motion from one scan to the next differs by more than this from the one before (m + rad)."""
+
 REST_STD_XY = 0.002
 REST_STD_THETA = math.radians(0.05)
 """Standard deviations of odometry that reports no motion (m, rad)."""
+
+
+def way(start: Pose, end: Pose) -> float:
+    """Way from a pose to another (m + rad)."""
+    x, y, theta = end - start
+    return math.hypot(x, y) + abs(wrap(theta))
 
 
 class MotionModel:
@@ -39,6 +48,7 @@ class MotionModel:
         self._config = config
         self._odometry: Pose = np.zeros(3)
         self._stamp = 0.0
+        self._last_step: Pose = np.zeros(3)
         self._last_motion: Pose = np.zeros(3)
         self._last_seconds = 0.0
         self._silent = 0
@@ -56,6 +66,10 @@ class MotionModel:
     def still(self, scan: LaserScan) -> bool:
         """Whether odometry says the same of a scan as of the last."""
         return bool((scan.odometry == self._odometry).all())
+
+    def leaps(self, scan: LaserScan) -> bool:
+        """Whether odometry's motion to a scan is unlike the one before: wheels slip, messages come late."""
+        return way(self._last_step, between(self._odometry, scan.odometry)) > LEAP
 
     def start(self, scan: LaserScan) -> None:
         """Begin with the first scan."""
@@ -87,6 +101,7 @@ class MotionModel:
             self._silent = 0
         elif math.hypot(motion[0], motion[1]) + abs(motion[2]) > MOVING:
             self._silent += 1
+        self._last_step = between(self._odometry, scan.odometry)
         self._last_motion, self._last_seconds = motion, scan.stamp - self._stamp
         self._odometry, self._stamp = scan.odometry, scan.stamp
 

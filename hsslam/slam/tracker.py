@@ -14,7 +14,7 @@ from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWin
 from hsslam.scan import LaserScan
 from hsslam.se2 import Points, Pose, between, compose, wrap
 from hsslam.slam.fusion import GATE, fuse, rotated, squared_mahalanobis
-from hsslam.slam.motion import MotionModel
+from hsslam.slam.motion import MotionModel, way
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import LocalSubmap
@@ -38,8 +38,11 @@ FORGETTING = 0.1
 RECOVERY_GAIN = 0.12
 """Odometry is overruled only by an answer whose score is this much higher: people who walk along see no motion."""
 
+LEAP_GAIN = 0.06
+"""By this much, where odometry leaps and the answer goes on as the robot went."""
+
 STEADY = 2.0
-"""And this many times as much where odometry goes on as the robot went, and the answer does not: robots do not leap."""
+"""This many times as much where odometry goes on as the robot went, and the answer does not: robots do not leap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,15 +152,16 @@ class Tracker:
             result = match_within(self._matcher, reference, points, predicted, window, self._window, rng)
         # An outage looks like odometry that reports no motion: then it tells nothing that could be contradicted.
         told = not (self._motion.silent or self._motion.still(scan))
+        leaps = told and self._motion.leaps(scan)
         if self._cut_off(result, predicted, window, told):
             with self._stopwatch.measure("recover"):
                 result = self._look_further(reference, points, predicted, result, rng)
         if told and (_contradicts(result, predicted, prior) or result.score < rules.recovery_score):
             with self._stopwatch.measure("recover"):
-                result = self._agree(reference, points, predicted, prior, result, rng)
+                result = self._agree(reference, points, predicted, prior, leaps, result, rng)
         if not result.converged or result.score < rules.recovery_score:
             with self._stopwatch.measure("recover"):
-                result = self._recover(reference, points, predicted, told, result, rng)
+                result = self._recover(reference, points, predicted, told, leaps, result, rng)
         matched = result.converged and result.score >= rules.min_score
         if not matched:
             pose, covariance = predicted, prior
@@ -201,6 +205,7 @@ class Tracker:
         points: Points,
         predicted: Pose,
         prior: NDArray[np.float64],
+        leaps: bool,
         first: MatchResult,
         rng: np.random.Generator,
     ) -> MatchResult:
@@ -208,18 +213,19 @@ class Tracker:
         window = foreseen_window(max(prior[0, 0], prior[1, 1]), prior[2, 2], AGREEING, self._window)
         near = self._matcher.match(reference, points, predicted, window, rng)
         evaluations = first.evaluations + near.evaluations
-        if not near.converged or near.score <= first.score - self._least_gain(predicted, first.pose):
+        if not near.converged or near.score <= first.score - self._least_gain(predicted, first.pose, leaps):
             return replace(first, evaluations=evaluations)
         # What so narrow a window adds to the covariance is odometry's, and odometry is weighed by itself.
         return known_within(
             self._matcher, self._window, reference, points, replace(near, evaluations=evaluations)
         )
 
-    def _least_gain(self, predicted: Pose, found: Pose) -> float:
-        """By how much an answer must score higher to overrule odometry: more, if odometry went on as the robot went."""
+    def _least_gain(self, predicted: Pose, found: Pose, leaps: bool) -> float:
+        """By how much an answer must score higher to overrule odometry: it matters which goes on as the robot went."""
         repeated = compose(self._pose, self._motion.last_motion)
-        steadier = _way(predicted, repeated) < _way(found, repeated)
-        return STEADY * RECOVERY_GAIN if steadier else RECOVERY_GAIN
+        if way(predicted, repeated) < way(found, repeated):
+            return STEADY * RECOVERY_GAIN
+        return LEAP_GAIN if leaps else RECOVERY_GAIN
 
     def _recover(
         self,
@@ -227,6 +233,7 @@ class Tracker:
         points: Points,
         predicted: Pose,
         told: bool,
+        leaps: bool,
         first: MatchResult,
         rng: np.random.Generator,
     ) -> MatchResult:
@@ -238,7 +245,7 @@ class Tracker:
         if not best.converged or best.score < rules.recovery_score:
             best = match_within(self._matcher, reference, points, repeated, self._widest, self._window, rng)
             evaluations += best.evaluations
-        gain = self._least_gain(predicted, best.pose) if told else RECOVERY_GAIN
+        gain = self._least_gain(predicted, best.pose, leaps) if told else RECOVERY_GAIN
         if best.converged and (not first.converged or best.score > first.score + gain):
             return self._settled(reference, points, best, evaluations, rng)
         return replace(first, evaluations=evaluations)
@@ -263,12 +270,6 @@ class Tracker:
 
 def _at_edge(off: Pose, window: SearchWindow) -> bool:
     return bool((np.abs(off) > EDGE * window.half).any())
-
-
-def _way(start: Pose, end: Pose) -> float:
-    """Way from a pose to another (m + rad)."""
-    x, y, theta = end - start
-    return math.hypot(x, y) + abs(wrap(theta))
 
 
 def _contradicts(result: MatchResult, predicted: Pose, prior: NDArray[np.float64]) -> bool:
