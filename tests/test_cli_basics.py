@@ -98,6 +98,12 @@ def test_version() -> None:
         (["match", "office", "1", "2000"], 3, "there is no scan 2000"),
         (["eval", "nowhere.tum", "--dataset", "office"], 3, "nowhere.tum"),
         (["compare", "office", "--dataset", "hall"], 2, "named twice"),
+        (
+            ["compare", "office", "hall", "--datasets", "corridor"],
+            2,
+            "named twice: office hall and --datasets",
+        ),
+        (["compare", "office", "nowhere.clf"], 3, "nowhere.clf: no such file"),
         (["compare", "--matchers", "hsl", "hid", "--no-slam"], 2, "did you mean 'hide'?"),
         (["compare", "--matchers", "hide", "--set", "matcher.memory_size=9"], 2, "hide.memory_size=9"),
         (["compare", "--matchers", "hide", "--set", "trials.cuont=9"], 2, "did you mean 'count'?"),

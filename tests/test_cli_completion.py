@@ -39,6 +39,7 @@ def completed(line: str, after: str = "") -> list[str]:
         ("hsslam compare office --matchers hide gl", ["glasm"]),
         ("hsslam compare --matchers hide,gl", ["hide,glasm"]),
         ("hsslam compare --matchers hsl hide --datasets office cor", ["corridor"]),
+        ("hsslam compare office cor", ["corridor"]),
         ("hsslam compare corridor --matchers hide --see", ["--seed", "--seeds"]),
         ("hsslam compare corridor --seeds 2 --dataset off", ["office"]),
         ("hsslam matchers describe hs", ["hsl"]),

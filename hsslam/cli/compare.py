@@ -70,23 +70,23 @@ def _next_name(ctx: typer.Context, incomplete: str) -> list[str]:
 
 
 def compare(
-    name: Annotated[
-        str | None,
+    names: Annotated[
+        list[str] | None,
         typer.Argument(
-            metavar="[DATASET|PATH]",
-            help="A name that `hsslam datasets` lists, or a log; office if left out.",
+            metavar="DATASET",
+            help="Names that `hsslam datasets` lists, or logs; office if left out.",
             autocompletion=_next_name,
         ),
     ] = None,
     dataset: Annotated[
         str | None,
-        typer.Option(metavar="NAME|PATH", help="The same, as an option.", autocompletion=complete.datasets),
+        typer.Option(metavar="NAME|PATH", help="One, as an option.", autocompletion=complete.datasets),
     ] = None,
     datasets: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME|PATH...",
-            help="Several: each has its part of the report.",
+            help="Several, as an option: each has its part of the report.",
             autocompletion=complete.several_datasets,
         ),
     ] = None,
@@ -172,7 +172,7 @@ def compare(
     from hsslam_eval.report import write_report
 
     check(scheduler, workers, data_dir)
-    named = _datasets(name, dataset, split(datasets or ()))
+    named = _datasets(list(dict.fromkeys(names or ())), dataset, split(datasets or ()))
     given = {
         "seed": seed,
         "seeds": seeds,
@@ -212,13 +212,13 @@ def compare(
             console.say(f"\n{attribution}")
 
 
-def _datasets(name: str | None, dataset: str | None, datasets: Sequence[str]) -> list[str]:
-    ways = [name] if name else []
+def _datasets(names: Sequence[str], dataset: str | None, datasets: Sequence[str]) -> list[str]:
+    ways = [" ".join(names)] if names else []
     ways += [f"--dataset {dataset}"] if dataset else []
     ways += ["--datasets"] if datasets else []
     if len(ways) > 1:
         raise ConfigError(f"the dataset is named twice: {' and '.join(ways)}; name all after --datasets")
-    return list(datasets) or [name or dataset or "office"]
+    return list(names or datasets) or [dataset or "office"]
 
 
 class Tell:

@@ -21,7 +21,7 @@ def report(
     runs: Annotated[
         list[str],
         typer.Argument(
-            metavar="RUN...",
+            metavar="RUN",
             help="Run folders; trajectories of other systems (.tum, or .csv with scan,x,y,theta), NAME=PATH to name "
             "them; or the folder of one comparison.",
         ),
