@@ -128,7 +128,7 @@ def test_a_person_who_walks_along_does_not_draw_a_scan_away() -> None:
     # more of the scan than the corridor's end: 14 cm on, the person fits best where the robot was.
     along = np.linspace(-3.0, 6.0, 181)
     end = np.column_stack((np.full(20, 6.0), np.linspace(-0.95, 0.95, 20)))
-    arc = np.linspace(0.6 * math.pi, 1.4 * math.pi, 36)
+    arc = np.linspace(0.6 * math.pi, 1.4 * math.pi, 32)
     person = np.array([1.2, 0.0]) + 0.25 * np.column_stack((np.cos(arc), np.sin(arc)))[::-1]
     walls = [np.column_stack((along, np.full(181, -1.0))), np.column_stack((along[::-1], np.full(181, 1.0)))]
 
