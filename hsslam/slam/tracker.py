@@ -10,39 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import Config
-from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
+from hsslam.matching.interface import Matcher
 from hsslam.scan import LaserScan
-from hsslam.se2 import Points, Pose, between, compose, wrap
-from hsslam.slam.fusion import GATE, fuse, rotated, squared_mahalanobis
-from hsslam.slam.motion import MotionModel, way
+from hsslam.se2 import Points, Pose, between, compose
+from hsslam.slam.fusion import fuse, rotated
+from hsslam.slam.locator import Expectation, Locator
+from hsslam.slam.motion import MotionModel
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import LocalSubmap
-from hsslam.slam.windows import AGREEING, foreseen_window, known_within, match_within, search_window
-
-EDGE = 0.9
-"""An answer this far from the middle of the window, as a share of its half side, may be the edge of a better one."""
 
 SOONER = 1.0 / 3.0
 """Share of the usual way to the next keyframe after which one is made where the submap explains too little."""
 
-EDGE_GAIN = 0.02
-"""An answer beyond the window is believed only if its score is this much higher: among many places one seems better."""
-
-USUAL = 0.05
-"""A scan fits as usual if its score is no further than this below those of the last scans."""
-
 FORGETTING = 0.1
 """Share of the newest score in what is usual."""
-
-RECOVERY_GAIN = 0.12
-"""Odometry is overruled only by an answer whose score is this much higher: people who walk along see no motion."""
-
-LEAP_GAIN = 0.06
-"""By this much, where odometry leaps and the answer goes on as the robot went."""
-
-STEADY = 2.0
-"""This many times as much where odometry goes on as the robot went, and the answer does not: robots do not leap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +55,6 @@ class Tracker:
         self._config = config
         self._matcher = matcher
         self._stopwatch = stopwatch
-        self._window = search_window(config.tracker.window)
-        self._widest = search_window(config.tracker.recovery_window)
         self._submap = LocalSubmap(matcher, config.keyframes.submap_size)
         self._motion = MotionModel(config.graph)
         self._pose: Pose = np.zeros(3)
@@ -144,24 +124,19 @@ class Tracker:
         self, scan: LaserScan, points: Points, predicted: Pose, prior: NDArray[np.float64]
     ) -> TrackedScan:
         rules = self._config.tracker
-        reference = self._submap.reference
-        rng = generator(self._config.seed, Purpose.TRACK, scan.index)
-        # A robot that turns far between two scans may have turned farther than the usual window reaches.
-        window = foreseen_window(max(prior[0, 0], prior[1, 1]), prior[2, 2], self._window, self._widest)
-        with self._stopwatch.measure("track"):
-            result = match_within(self._matcher, reference, points, predicted, window, self._window, rng)
-        # An outage looks like odometry that reports no motion: then it tells nothing that could be contradicted.
         told = not (self._motion.silent or self._motion.still(scan))
-        leaps = told and self._motion.leaps(scan)
-        if self._cut_off(result, predicted, window, told):
-            with self._stopwatch.measure("recover"):
-                result = self._look_further(reference, points, predicted, result, rng)
-        if told and (_contradicts(result, predicted, prior) or result.score < rules.recovery_score):
-            with self._stopwatch.measure("recover"):
-                result = self._agree(reference, points, predicted, prior, leaps, result, rng)
-        if not result.converged or result.score < rules.recovery_score:
-            with self._stopwatch.measure("recover"):
-                result = self._recover(reference, points, predicted, told, leaps, result, rng)
+        expected = Expectation(
+            pose=predicted,
+            covariance=prior,
+            repeated=compose(self._pose, self._motion.last_motion),
+            told=told,
+            leaps=told and self._motion.leaps(scan),
+            score=self._usual_score,
+        )
+        rng = generator(self._config.seed, Purpose.TRACK, scan.index)
+        result = Locator(rules, self._matcher, self._submap.reference, points, rng, self._stopwatch).locate(
+            expected
+        )
         matched = result.converged and result.score >= rules.min_score
         if not matched:
             pose, covariance = predicted, prior
@@ -173,107 +148,3 @@ class Tracker:
         return TrackedScan(
             between(newest, pose), rotated(covariance, newest[2]), result.score, matched, result.evaluations
         )
-
-    def _cut_off(self, result: MatchResult, predicted: Pose, window: SearchWindow, told: bool) -> bool:
-        """Whether a better answer may lie beyond the edge of the window around the prediction, which odometry told."""
-        off = result.pose - predicted
-        off[2] = wrap(off[2])
-        direction = result.diagnostics.get("degenerate_direction")
-        if told and direction is not None and result.score >= self._usual_score - USUAL:
-            # All places along it are as good, those at the edge too: a bare wall's are, if the scan fits as ever.
-            along = np.array([math.cos(direction), math.sin(direction), 0.0])
-            off -= (off @ along) * along
-        return _at_edge(off, window)
-
-    def _look_further(
-        self,
-        reference: Reference,
-        points: Points,
-        predicted: Pose,
-        first: MatchResult,
-        rng: np.random.Generator,
-    ) -> MatchResult:
-        """Search the widest window around the prediction: what a narrow one found at its edge was cut off by it."""
-        wide = match_within(self._matcher, reference, points, predicted, self._widest, self._window, rng)
-        evaluations = first.evaluations + wide.evaluations
-        better = wide.converged and (not first.converged or wide.score > first.score + EDGE_GAIN)
-        return self._settled(reference, points, wide if better else first, evaluations, rng)
-
-    def _agree(
-        self,
-        reference: Reference,
-        points: Points,
-        predicted: Pose,
-        prior: NDArray[np.float64],
-        leaps: bool,
-        first: MatchResult,
-        rng: np.random.Generator,
-    ) -> MatchResult:
-        """Search only where odometry may be right: what fits about as well there is likelier than what denies it."""
-        window = foreseen_window(max(prior[0, 0], prior[1, 1]), prior[2, 2], AGREEING, self._window)
-        near = self._matcher.match(reference, points, predicted, window, rng)
-        evaluations = first.evaluations + near.evaluations
-        if not near.converged or near.score <= first.score - self._least_gain(predicted, first.pose, leaps):
-            return replace(first, evaluations=evaluations)
-        # What so narrow a window adds to the covariance is odometry's, and odometry is weighed by itself.
-        return known_within(
-            self._matcher, self._window, reference, points, replace(near, evaluations=evaluations)
-        )
-
-    def _least_gain(self, predicted: Pose, found: Pose, leaps: bool) -> float:
-        """By how much an answer must score higher to overrule odometry: it matters which goes on as the robot went."""
-        repeated = compose(self._pose, self._motion.last_motion)
-        if way(predicted, repeated) < way(found, repeated):
-            return STEADY * RECOVERY_GAIN
-        return LEAP_GAIN if leaps else RECOVERY_GAIN
-
-    def _recover(
-        self,
-        reference: Reference,
-        points: Points,
-        predicted: Pose,
-        told: bool,
-        leaps: bool,
-        first: MatchResult,
-        rng: np.random.Generator,
-    ) -> MatchResult:
-        """Doubt odometry: try the last motion once more as the prediction, then a wide window around it."""
-        rules = self._config.tracker
-        repeated = compose(self._pose, self._motion.last_motion)
-        best = self._matcher.match(reference, points, repeated, self._window, rng)
-        evaluations = first.evaluations + best.evaluations
-        if not best.converged or best.score < rules.recovery_score:
-            best = match_within(self._matcher, reference, points, repeated, self._widest, self._window, rng)
-            evaluations += best.evaluations
-        gain = self._least_gain(predicted, best.pose, leaps) if told else RECOVERY_GAIN
-        if best.converged and (not first.converged or best.score > first.score + gain):
-            return self._settled(reference, points, best, evaluations, rng)
-        return replace(first, evaluations=evaluations)
-
-    def _settled(
-        self,
-        reference: Reference,
-        points: Points,
-        found: MatchResult,
-        evaluations: int,
-        rng: np.random.Generator,
-    ) -> MatchResult:
-        """Search once more around what was found far off: the wide window, too, may have cut it off."""
-        near = self._matcher.match(reference, points, found.pose, self._window, rng)
-        evaluations += near.evaluations
-        if not near.converged or near.score < found.score - EDGE_GAIN:
-            return replace(found, evaluations=evaluations)
-        return known_within(
-            self._matcher, self._widest, reference, points, replace(near, evaluations=evaluations)
-        )
-
-
-def _at_edge(off: Pose, window: SearchWindow) -> bool:
-    return bool((np.abs(off) > EDGE * window.half).any())
-
-
-def _contradicts(result: MatchResult, predicted: Pose, prior: NDArray[np.float64]) -> bool:
-    """Whether a match and the prediction cannot both be right."""
-    off = result.pose - predicted
-    off[2] = wrap(off[2])
-    return result.converged and squared_mahalanobis(off, prior + result.covariance) > GATE

@@ -1,0 +1,200 @@
+"""One scan in the submap: around odometry's prediction first, then wherever there is reason to doubt it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam.config import TrackerSection
+from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
+from hsslam.se2 import Points, Pose, wrap
+from hsslam.slam.fusion import GATE, squared_mahalanobis
+from hsslam.slam.motion import way
+from hsslam.slam.stopwatch import Stopwatch
+from hsslam.slam.windows import AGREEING, foreseen_window, known_within, match_within, search_window
+
+EDGE = 0.9
+"""An answer this far from the middle of the window, as a share of its half side, may be the edge of a better one."""
+
+EDGE_GAIN = 0.02
+"""An answer beyond the window is believed only if its score is this much higher: among many places one seems better."""
+
+USUAL = 0.05
+"""A scan fits as usual if its score is no further than this below those of the last scans."""
+
+RECOVERY_GAIN = 0.12
+"""Odometry is overruled only by an answer whose score is this much higher: people who walk along see no motion."""
+
+LEAP_GAIN = 0.06
+"""By this much, where odometry leaps and the answer goes on as the robot went."""
+
+STEADY = 2.0
+"""This many times as much where odometry goes on as the robot went, and the answer does not: robots do not leap."""
+
+
+@dataclass(frozen=True, eq=False)
+class Expectation:
+    """What is known of a scan's pose before it is matched.
+
+    Attributes
+    ----------
+    pose : Pose
+        Where odometry says that it is, in the submap.
+    covariance : float64 (3, 3)
+        Of that pose (m^2, rad^2).
+    repeated : Pose
+        Where it is if the robot moved as it did before.
+    told : bool
+        Whether odometry tells of motion: an outage looks like a robot at rest, and cannot be contradicted.
+    leaps : bool
+        Whether odometry's motion is unlike the one before.
+    score : float
+        What the last scans scored.
+    """
+
+    pose: Pose
+    covariance: NDArray[np.float64]
+    repeated: Pose
+    told: bool
+    leaps: bool
+    score: float
+
+    def window(self, least: SearchWindow, most: SearchWindow) -> SearchWindow:
+        """As far as the truth may be from the expected pose, between two other windows."""
+        variances = self.covariance
+        return foreseen_window(max(variances[0, 0], variances[1, 1]), variances[2, 2], least, most)
+
+    def least_gain(self, found: Pose) -> float:
+        """By how much an answer must score higher to overrule odometry: it matters which goes on as the robot went."""
+        if not self.told:
+            return RECOVERY_GAIN
+        if way(self.pose, self.repeated) < way(found, self.repeated):
+            return STEADY * RECOVERY_GAIN
+        return LEAP_GAIN if self.leaps else RECOVERY_GAIN
+
+
+class Locator:
+    """Matches one scan against one submap, as often and as widely as it takes.
+
+    Parameters
+    ----------
+    rules : TrackerSection
+        Windows, and the scores below which a match is doubted.
+    matcher : Matcher
+        Any.
+    reference : Reference
+        The submap, prepared by the matcher.
+    points : Points
+        (N, 2) m, the scan's returns in the robot's frame.
+    rng : numpy.random.Generator
+        The scan's own.
+    stopwatch : Stopwatch
+        Told how long the first match took, and all others.
+    """
+
+    def __init__(
+        self,
+        rules: TrackerSection,
+        matcher: Matcher[Any],
+        reference: Reference,
+        points: Points,
+        rng: np.random.Generator,
+        stopwatch: Stopwatch,
+    ) -> None:
+        self._rules = rules
+        self._matcher = matcher
+        self._reference = reference
+        self._points = points
+        self._rng = rng
+        self._stopwatch = stopwatch
+        self._window = search_window(rules.window)
+        self._widest = search_window(rules.recovery_window)
+        self._evaluations = 0
+
+    def locate(self, expected: Expectation) -> MatchResult:
+        """The best answer, whose ``evaluations`` are those of all matches that it took."""
+        # A robot that turns far between two scans may have turned farther than the usual window reaches.
+        window = expected.window(self._window, self._widest)
+        with self._stopwatch.measure("track"):
+            found = self._match(expected.pose, window)
+        if _cut_off(found, expected, window):
+            with self._stopwatch.measure("recover"):
+                found = self._look_further(expected, found)
+        if expected.told and (_contradicts(found, expected) or self._doubtful(found)):
+            with self._stopwatch.measure("recover"):
+                found = self._agree(expected, found)
+        if self._doubtful(found):
+            with self._stopwatch.measure("recover"):
+                found = self._recover(expected, found)
+        return replace(found, evaluations=self._evaluations)
+
+    def _match(self, guess: Pose, window: SearchWindow) -> MatchResult:
+        result = match_within(
+            self._matcher, self._reference, self._points, guess, window, self._window, self._rng
+        )
+        self._evaluations += result.evaluations
+        return result
+
+    def _known_within(self, window: SearchWindow, result: MatchResult) -> MatchResult:
+        return known_within(self._matcher, window, self._reference, self._points, result)
+
+    def _doubtful(self, result: MatchResult) -> bool:
+        return not result.converged or result.score < self._rules.recovery_score
+
+    def _look_further(self, expected: Expectation, first: MatchResult) -> MatchResult:
+        """Search the widest window around the prediction: what a narrow one found at its edge was cut off by it."""
+        wide = self._match(expected.pose, self._widest)
+        better = wide.converged and (not first.converged or wide.score > first.score + EDGE_GAIN)
+        return self._settled(wide if better else first)
+
+    def _agree(self, expected: Expectation, first: MatchResult) -> MatchResult:
+        """Search only where odometry may be right: what fits about as well there is likelier than what denies it."""
+        near = self._match(expected.pose, expected.window(AGREEING, self._window))
+        if not near.converged or near.score <= first.score - expected.least_gain(first.pose):
+            return first
+        # What so narrow a window adds to the covariance is odometry's, and odometry is weighed by itself.
+        return self._known_within(self._window, near)
+
+    def _recover(self, expected: Expectation, first: MatchResult) -> MatchResult:
+        """Doubt odometry: try the last motion once more as the prediction, then a wide window around it."""
+        best = self._match(expected.repeated, self._window)
+        if self._doubtful(best):
+            best = self._match(expected.repeated, self._widest)
+        gain = expected.least_gain(best.pose)
+        if best.converged and (not first.converged or best.score > first.score + gain):
+            return self._settled(best)
+        return first
+
+    def _settled(self, found: MatchResult) -> MatchResult:
+        """Search once more around what was found far off: the wide window, too, may have cut it off."""
+        near = self._match(found.pose, self._window)
+        if not near.converged or near.score < found.score - EDGE_GAIN:
+            return found
+        return self._known_within(self._widest, near)
+
+
+def _cut_off(result: MatchResult, expected: Expectation, window: SearchWindow) -> bool:
+    """Whether a better answer may lie beyond the edge of the window around the expected pose."""
+    off = _difference(result.pose, expected.pose)
+    direction = result.diagnostics.get("degenerate_direction")
+    if expected.told and direction is not None and result.score >= expected.score - USUAL:
+        # All places along it are as good, those at the edge too: a bare wall's are, if the scan fits as ever.
+        along = np.array([math.cos(direction), math.sin(direction), 0.0])
+        off -= (off @ along) * along
+    return bool((np.abs(off) > EDGE * window.half).any())
+
+
+def _contradicts(result: MatchResult, expected: Expectation) -> bool:
+    """Whether a match and the expectation cannot both be right."""
+    off = _difference(result.pose, expected.pose)
+    return result.converged and squared_mahalanobis(off, expected.covariance + result.covariance) > GATE
+
+
+def _difference(pose: Pose, other: Pose) -> Pose:
+    off: Pose = pose - other
+    off[2] = wrap(off[2])
+    return off
