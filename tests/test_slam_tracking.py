@@ -52,7 +52,9 @@ def test_a_scan_beyond_the_usual_window_is_found(
 
 
 @pytest.mark.parametrize(
-    "odometry", [pose(0.59, -0.8, 0.46), pose(0.86, -0.5, 0.9)], ids=["grown", "at once"]
+    "odometry",
+    [pose(0.59, -0.8, 0.46), pose(0.86, -0.5, 0.9), pose(1.1, 0.0, 0.4)],
+    ids=["grown", "at once", "step by step"],
 )
 def test_an_answer_at_the_edge_of_the_widest_window_is_searched_around(odometry: NDArray[np.float64]) -> None:
     """Cut off a few centimetres short of the best, it seemed uncertain, and odometry's jump was given weight."""

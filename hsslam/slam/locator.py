@@ -23,6 +23,9 @@ EDGE = 0.9
 EDGE_GAIN = 0.02
 """An answer beyond the window is believed only if its score is this much higher: among many places one seems better."""
 
+SETTLINGS = 4
+"""How often an answer is followed to the edge of the window around it, at most."""
+
 USUAL = 0.05
 """A scan fits as usual if its score is no further than this below those of the last scans."""
 
@@ -170,11 +173,16 @@ class Locator:
         return first
 
     def _settled(self, found: MatchResult) -> MatchResult:
-        """Search once more around what was found far off: the wide window, too, may have cut it off."""
-        near = self._match(found.pose, self._window)
-        if not near.converged or near.score < found.score - EDGE_GAIN:
-            return found
-        return self._known_within(self._widest, near)
+        """Search on around what was found far off: the wide window, too, may have cut it off."""
+        for _ in range(SETTLINGS):
+            near = self._match(found.pose, self._window)
+            if not near.converged or near.score < found.score - EDGE_GAIN:
+                return found
+            moved = _difference(near.pose, found.pose)
+            found = self._known_within(self._widest, near)
+            if not _at_edge(moved, self._window):
+                break
+        return found
 
 
 def _cut_off(result: MatchResult, expected: Expectation, window: SearchWindow) -> bool:
@@ -185,6 +193,10 @@ def _cut_off(result: MatchResult, expected: Expectation, window: SearchWindow) -
         # All places along it are as good, those at the edge too: a bare wall's are, if the scan fits as ever.
         along = np.array([math.cos(direction), math.sin(direction), 0.0])
         off -= (off @ along) * along
+    return _at_edge(off, window)
+
+
+def _at_edge(off: Pose, window: SearchWindow) -> bool:
     return bool((np.abs(off) > EDGE * window.half).any())
 
 
