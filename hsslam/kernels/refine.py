@@ -14,6 +14,10 @@ from hsslam.se2 import Points, Pose, wrap
 NO_LINES: NDArray[np.float64] = np.empty((0, 3))
 """Point-to-line only."""
 
+GRAZING = 0.35
+"""Squared cosine of the angle between a beam and the normal of the line that it meets, at least: the spot of a real
+beam that grazes a wall is long."""
+
 LEAST_AGREEMENT = 0.5
 """Cosine of the angle between two lines that may be of the same surface, at least."""
 
@@ -38,6 +42,9 @@ def refine(
     lines of neither are taken for the truth. And a point whose line runs the other way is left out: it is of the
     other side of a wall, which robots in neighbouring rooms see 10 to 20 cm apart.
 
+    A range errs along its beam, from the origin of the points' frame, so the part of its variance that is across the
+    line is the squared cosine between beam and normal: points count by its inverse, as far as `GRAZING` lets them.
+
     Parameters
     ----------
     pieces, nearest, frame : arrays
@@ -56,7 +63,8 @@ def refine(
     distances : (float, float)
         Points further than this from the surface are left out (m), from the first to the last.
     scales : (float, float)
-        Of the Cauchy weight ``1 / (1 + (r / scale)^2)`` (m), from the first to the last.
+        Of the Cauchy weight ``1 / (1 + (r / scale)^2)`` (m), from the first to the last, where a beam meets its line
+        upright.
 
     Returns
     -------
@@ -97,7 +105,9 @@ def refine(
                 if agreement < -LEAST_AGREEMENT:
                     continue
             residual = nx * x + ny * y - pieces[k, 7]
-            weight = squared_scale / (squared_scale + residual * residual)
+            across = nx * rx + ny * ry
+            grazing = max(across * across / (rx * rx + ry * ry + 1e-12), GRAZING)
+            weight = squared_scale / (grazing * squared_scale + residual * residual)
             nt = ny * rx - nx * ry
             wx, wy, wt = weight * nx, weight * ny, weight * nt
             used += 1
