@@ -133,6 +133,9 @@ class Locator:
         if self._doubtful(found):
             with self._stopwatch.measure("recover"):
                 found = self._recover(expected, found)
+        elif expected.leaps and found.score < 1.0 - LEAP_GAIN:
+            with self._stopwatch.measure("recover"):
+                found = self._steadier(expected, found)
         return replace(found, evaluations=self._evaluations)
 
     def _match(self, guess: Pose, window: SearchWindow) -> MatchResult:
@@ -161,6 +164,12 @@ class Locator:
             return first
         # What so narrow a window adds to the covariance is odometry's, and odometry is weighed by itself.
         return self._known_within(self._window, near)
+
+    def _steadier(self, expected: Expectation, first: MatchResult) -> MatchResult:
+        """Where odometry leaps, try the last motion once more: a jump may reach further than any window."""
+        best = self._match(expected.repeated, self._window)
+        better = best.converged and best.score > first.score + LEAP_GAIN
+        return best if better else first
 
     def _recover(self, expected: Expectation, first: MatchResult) -> MatchResult:
         """Doubt odometry: try the last motion once more as the prediction, then a wide window around it."""
