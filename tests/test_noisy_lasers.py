@@ -124,16 +124,20 @@ def test_along_a_bare_wall_a_noisy_laser_does_not_lead_the_robot_astray() -> Non
     cheap = LaserModel(
         "cheap", 360, -math.pi, math.radians(1.0), 0.15, 10.0, 0.05, 0.0, 0.005, 0.03, math.inf
     )
-    log = SimulatedDataset(
-        plan,
-        scans=240,
-        laser=cheap,
-        odometry=OdometryModel(),
-        motion=DriveModel(rate=5.0, speed=0.6, turn_rate=math.radians(50.0)),
-    )
-    online = Slam(load_config(overrides=["graph.rescan_keyframes=0"])).solve(log.scans()).online.poses
-    error = between_many(
-        between_many(log.poses[:1].repeat(240, axis=0), log.poses),
-        between_many(online[:1].repeat(240, axis=0), online),
-    )
-    assert np.hypot(error[:, 0], error[:, 1]).max() < 0.6
+    farthest = []
+    for seed in range(4):
+        log = SimulatedDataset(
+            plan,
+            seed=seed,
+            scans=240,
+            laser=cheap,
+            odometry=OdometryModel(),
+            motion=DriveModel(rate=5.0, speed=0.6, turn_rate=math.radians(50.0)),
+        )
+        online = Slam(load_config(overrides=["graph.rescan_keyframes=0"])).solve(log.scans()).online.poses
+        error = between_many(
+            between_many(log.poses[:1].repeat(240, axis=0), log.poses),
+            between_many(online[:1].repeat(240, axis=0), online),
+        )
+        farthest.append(np.hypot(error[:, 0], error[:, 1]).max())
+    assert np.mean(farthest) < 0.4

@@ -136,6 +136,9 @@ class Locator:
         elif expected.leaps and found.score < 1.0 - LEAP_GAIN:
             with self._stopwatch.measure("recover"):
                 found = self._steadier(expected, found)
+        if "degenerate_direction" in found.diagnostics:
+            # How far the window reaches along it is no news: that, too, is odometry's.
+            found = self._known_within(self._widest, found)
         return replace(found, evaluations=self._evaluations)
 
     def _match(self, guess: Pose, window: SearchWindow) -> MatchResult:
