@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from hsslam.kernels.assess import BINS, assess, degenerate_direction, median_of
 from hsslam.kernels.fitness import count_hits, interpolate_points, scratch
 from hsslam.kernels.raster import Raster
-from hsslam.kernels.refine import NO_LINES, refine, solve3
-from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, GAP, Surface, lines_of
+from hsslam.kernels.refine import GRAZING, NO_LINES, refine, solve3
+from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, GAP, Surface, lines_of, nearest_segment
 from hsslam.se2 import transform
 from hsslam.search import HitFitness
 
@@ -156,6 +156,44 @@ def test_refinement_returns_to_the_truth(x: float, y: float, theta: float, both_
     )
     assert converged
     assert found == pytest.approx(truth, abs=2e-3)
+
+
+def step_twin(
+    surface: Surface, points: NDArray[np.float64], pose: NDArray[np.float64], least: float
+) -> float:
+    """Length (m) of one more step by NumPy, of scale 3 cm, squared cosines of beams and normals ``least`` at least."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    beams = points @ np.array([[c, s], [-s, c]])
+    places = beams + pose[:2]
+    lines = surface.pieces[[nearest_segment(surface.nearest, surface.frame, *place) for place in places], 5:8]
+    residuals = (lines[:, :2] * places).sum(axis=1) - lines[:, 2]
+    cosines = (lines[:, :2] * beams).sum(axis=1) / np.hypot(*beams.T)
+    weights = 1.0 / (np.maximum(cosines**2, least) + (residuals / 0.03) ** 2)
+    rows = np.column_stack((lines[:, :2], lines[:, 1] * beams[:, 0] - lines[:, 0] * beams[:, 1]))
+    step = np.linalg.solve(rows.T @ (weights[:, None] * rows), -rows.T @ (weights * residuals))
+    return float(np.hypot(*step[:2]))
+
+
+def test_refinement_ends_where_the_weighted_distances_balance() -> None:
+    reference = corner()
+    surface = Surface.build(reference)
+    points = reference - [1.0, 1.0] + np.random.default_rng(1).normal(0.0, 0.02, reference.shape)
+    start = np.array([1.0, 1.0, 0.0])
+    found, _, converged = refine(
+        surface.pieces,
+        surface.nearest,
+        surface.frame,
+        points,
+        NO_LINES,
+        start,
+        30,
+        4.0,
+        (0.15, 0.15),
+        (0.03, 0.03),
+    )
+    assert converged
+    assert step_twin(surface, points, found, GRAZING) < 1e-4
+    assert step_twin(surface, points, found, 1.0) > 5e-4
 
 
 @given(

@@ -140,4 +140,5 @@ def test_along_a_bare_wall_a_noisy_laser_does_not_lead_the_robot_astray() -> Non
             between_many(online[:1].repeat(240, axis=0), online),
         )
         farthest.append(np.hypot(error[:, 0], error[:, 1]).max())
+    assert np.max(farthest) < 0.6
     assert np.mean(farthest) < 0.4
