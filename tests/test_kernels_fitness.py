@@ -1,4 +1,4 @@
-"""Rasters, hits, assessment and refinement against their NumPy twins."""
+"""Rasters, hits and assessment against their NumPy twins."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hsslam.kernels.assess import BINS, assess, degenerate_direction, median_of
+from hsslam.kernels.assess import assess, degenerate_direction
 from hsslam.kernels.fitness import count_hits, interpolate_points, scratch
 from hsslam.kernels.raster import Raster
-from hsslam.kernels.refine import GRAZING, NO_LINES, refine, solve3
-from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, GAP, Surface, lines_of, nearest_segment
-from hsslam.se2 import transform
+from hsslam.kernels.surface import Surface
 from hsslam.search import HitFitness
 
 coordinates = st.floats(-4.0, 4.0, allow_nan=False)
@@ -140,75 +138,6 @@ def test_covariance_inverts_the_information() -> None:
     assert np.linalg.eigvalsh(covariance)[0] > 0.0
 
 
-@given(st.floats(-0.06, 0.06), st.floats(-0.06, 0.06), st.floats(-0.05, 0.05), st.booleans())
-@settings(deadline=None, max_examples=40)
-def test_refinement_returns_to_the_truth(x: float, y: float, theta: float, both_ways: bool) -> None:
-    reference = corner()
-    truth = np.array([0.3, 0.2, 0.1])
-    inverse_points = transform(
-        np.array([*(-np.array([[0.995004, 0.099833], [-0.099833, 0.995004]]) @ truth[:2]), -0.1]), reference
-    )
-    s = Surface.build(reference)
-    lines = lines_of(inverse_points, GAP, FIT_SPAN, FIT_ROUGHNESS) if both_ways else NO_LINES
-    start = truth + [x, y, theta]
-    found, _, converged = refine(
-        s.pieces, s.nearest, s.frame, inverse_points, lines, start, 30, 15.0, (0.15, 0.08), (0.03, 0.03)
-    )
-    assert converged
-    assert found == pytest.approx(truth, abs=2e-3)
-
-
-def step_twin(
-    surface: Surface, points: NDArray[np.float64], pose: NDArray[np.float64], least: float
-) -> float:
-    """Length (m) of one more step by NumPy, of scale 3 cm, squared cosines of beams and normals ``least`` at least."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    beams = points @ np.array([[c, s], [-s, c]])
-    places = beams + pose[:2]
-    lines = surface.pieces[[nearest_segment(surface.nearest, surface.frame, *place) for place in places], 5:8]
-    residuals = (lines[:, :2] * places).sum(axis=1) - lines[:, 2]
-    cosines = (lines[:, :2] * beams).sum(axis=1) / np.hypot(*beams.T)
-    weights = 1.0 / (np.maximum(cosines**2, least) + (residuals / 0.03) ** 2)
-    rows = np.column_stack((lines[:, :2], lines[:, 1] * beams[:, 0] - lines[:, 0] * beams[:, 1]))
-    step = np.linalg.solve(rows.T @ (weights[:, None] * rows), -rows.T @ (weights * residuals))
-    return float(np.hypot(*step[:2]))
-
-
-def test_refinement_ends_where_the_weighted_distances_balance() -> None:
-    reference = corner()
-    surface = Surface.build(reference)
-    points = reference - [1.0, 1.0] + np.random.default_rng(1).normal(0.0, 0.02, reference.shape)
-    start = np.array([1.0, 1.0, 0.0])
-    found, _, converged = refine(
-        surface.pieces,
-        surface.nearest,
-        surface.frame,
-        points,
-        NO_LINES,
-        start,
-        30,
-        4.0,
-        (0.15, 0.15),
-        (0.03, 0.03),
-    )
-    assert converged
-    assert step_twin(surface, points, found, GRAZING) < 1e-4
-    assert step_twin(surface, points, found, 1.0) > 5e-4
-
-
-@given(
-    st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9),
-    st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3),
-)
-@settings(deadline=None, max_examples=40)
-def test_solve3_solves(entries: list[float], right: list[float]) -> None:
-    root = np.array(entries).reshape(3, 3)
-    hessian = root @ root.T + 0.1 * np.eye(3)
-    out = np.empty(3)
-    solve3(hessian, np.array(right), out)
-    assert hessian @ out == pytest.approx(np.array(right), abs=1e-9)
-
-
 def test_a_plain_wall_leaves_its_own_direction_open_and_a_corner_none() -> None:
     angle = 0.4
     along = np.arange(-2.0, 2.0, 0.05)
@@ -324,12 +253,3 @@ def test_clutter_does_not_open_a_direction_that_returns_fix() -> None:
     assert score > 0.9
     assert np.isnan(direction)
     assert np.sqrt(covariance[0, 0]) < 0.03
-
-
-@given(st.lists(st.floats(0.0, 0.999), min_size=1, max_size=300))
-@settings(deadline=None, max_examples=60)
-def test_a_histogram_tells_the_median_to_a_bin(values: list[float]) -> None:
-    counts = np.histogram(values, bins=BINS, range=(0.0, 1.0))[0]
-    low, high = np.sort(values)[[(len(values) - 1) // 2, len(values) // 2]]
-    assert low - 1.01 / BINS <= median_of(counts, len(values)) / BINS <= high + 1.01 / BINS
-    assert median_of(np.zeros(BINS, dtype=np.int64), 0) == 0.0

@@ -21,7 +21,7 @@ WIDE = SearchWindow(0.5, 0.5, math.radians(30.0))
 
 def test_lines_of_both_scans_are_better_than_those_of_one() -> None:
     """With a URG-04LX the reference's lines are as noisy as the scan's points."""
-    one_way, both_ways = [], []
+    one_way, both_ways, turned = [], [], []
     for pair in simulate_pairs("office", 300, "urg-04lx", np.random.default_rng(3)):
         reference = Reference(pair.reference_points)
         points, truth = pair.scan_points, pair.relative
@@ -40,9 +40,13 @@ def test_lines_of_both_scans_are_better_than_those_of_one() -> None:
         )
         one_way.append(np.hypot(*between(truth, found)[:2]))
         found, _ = polish(reference, points, truth, truth, WIDE, 40)
-        both_ways.append(np.hypot(*between(truth, found)[:2]))
+        error = between(truth, found)
+        both_ways.append(np.hypot(*error[:2]))
+        turned.append(abs(math.degrees(error[2])))
     assert np.mean(both_ways) < 0.97 * np.mean(one_way)
     assert np.mean(both_ways) < 0.004
+    # 0.0437 where a range of 4 m, which errs by 4 cm, counts for as much as one of 1 m.
+    assert np.mean(turned) < 0.042
 
 
 def test_beams_that_graze_a_wall_tell_more_of_it() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
+from hsslam.kernels.histogram import BINS, median_of
 from hsslam.kernels.lines import MEDIAN
 from hsslam.kernels.matrix3 import deflate
 from hsslam.kernels.surface import Surface, nearest_segment, squared_distance
@@ -25,9 +26,6 @@ since what is left counts as knowledge of a direction that may be open."""
 
 LARGEST_TILT = 0.5
 """Variance of a line's direction (rad^2) beyond which it points nowhere."""
-
-BINS = 50
-"""Of the histogram of distances across lines, from which their median is told."""
 
 DEGENERATE_SHARE = 0.1
 """Share of the window's variance that a direction must keep to count as open."""
@@ -212,14 +210,3 @@ def gather(
     f = by_noise if by_noise[0] > by_lines[0] else by_lines
     feigned = np.array([[f[0], 0.0, f[1]], [0.0, f[0], f[2]], [f[1], f[2], f[3]]])
     return matched, variance, hessian, feigned, np.array([gx, gy, gt])
-
-
-@kernel
-def median_of(counts: NDArray[np.int64], total: int) -> float:
-    """Median of a histogram of ``total`` values, in bins from the beginning of the first; 0 where there are none."""
-    below = 0
-    for b in range(counts.shape[0]):
-        if counts[b] > 0 and 2 * (below + counts[b]) >= total:
-            return float(b + (0.5 * total - below) / counts[b])
-        below += counts[b]
-    return 0.0

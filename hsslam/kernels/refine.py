@@ -9,14 +9,11 @@ from numpy.typing import NDArray
 
 from hsslam.jit import kernel
 from hsslam.kernels.surface import nearest_segment
+from hsslam.kernels.variances import GRAZING, variances_of
 from hsslam.se2 import Points, Pose, wrap
 
 NO_LINES: NDArray[np.float64] = np.empty((0, 3))
 """Point-to-line only."""
-
-GRAZING = 0.35
-"""Squared cosine of the angle between a beam and the normal of the line that it meets, at least: the spot of a real
-beam that grazes a wall is long."""
 
 LEAST_AGREEMENT = 0.5
 """Cosine of the angle between two lines that may be of the same surface, at least."""
@@ -43,7 +40,9 @@ def refine(
     other side of a wall, which robots in neighbouring rooms see 10 to 20 cm apart.
 
     A range errs along its beam, from the origin of the points' frame, so the part of its variance that is across the
-    line is the squared cosine between beam and normal: points count by its inverse, as far as `GRAZING` lets them.
+    line is the squared cosine between beam and normal: points count by its inverse, as far as walls are even. And
+    where far ranges err more than near ones, they count for less: see `variances_of`, which is asked once the reach
+    has shrunk to its end.
 
     Parameters
     ----------
@@ -76,11 +75,17 @@ def refine(
     right = np.empty(3)
     step = np.empty(3)
     both = lines.shape[0] > 0
+    told = False
+    least = GRAZING
+    variances = np.ones(points.shape[0])
     for iteration in range(iterations):
         left = 1.0 - iteration / settle
         distance = max(distances[1], distances[0] * left)
         squared_scale = max(scales[1], scales[0] * left) ** 2
         settled = distance <= distances[1] and squared_scale <= scales[1] ** 2
+        if settled and not told:
+            least = variances_of(pieces, nearest, frame, points, pose, distance, variances)
+            told = True
         c, s = math.cos(pose[2]), math.sin(pose[2])
         x0, y0 = pose[0], pose[1]
         xx = xy = xt = yy = yt = tt = gx = gy = gt = 0.0
@@ -106,8 +111,8 @@ def refine(
                     continue
             residual = nx * x + ny * y - pieces[k, 7]
             across = nx * rx + ny * ry
-            grazing = max(across * across / (rx * rx + ry * ry + 1e-12), GRAZING)
-            weight = squared_scale / (grazing * squared_scale + residual * residual)
+            variance = variances[i] * max(across * across / (rx * rx + ry * ry + 1e-12), least)
+            weight = squared_scale / (variance * squared_scale + residual * residual)
             nt = ny * rx - nx * ry
             wx, wy, wt = weight * nx, weight * ny, weight * nt
             used += 1
@@ -124,7 +129,7 @@ def refine(
                 continue
             sx, sy = x - ex - x0, y - ey - y0
             residual = lines[i, 2] - mx * sx - my * sy
-            weight = squared_scale / (squared_scale + residual * residual)
+            weight = squared_scale / (variances[i] * squared_scale + residual * residual)
             nt = my * sx - mx * sy
             wx, wy, wt = weight * mx, weight * my, weight * nt
             xx += wx * mx
