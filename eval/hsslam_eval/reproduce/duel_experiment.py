@@ -10,7 +10,12 @@ from hsslam_eval.reproduce.duel import Bouts, Published
 from hsslam_eval.reproduce.duel_figure import draw
 from hsslam_eval.reproduce.experiment import Claim, Experiment, Request, Tell
 from hsslam_eval.reproduce.findings import Findings
-from hsslam_eval.reproduce.methods import Method
+from hsslam_eval.reproduce.methods import Method, oracle
+
+_BOUND = (
+    "The proven best pose is what a search would find that never failed. Where even that succeeds less often than the "
+    "paper's methods did, it is the fitness that limits them on these data: a search of it does better by luck alone."
+)
 
 
 def hold(
@@ -32,7 +37,7 @@ def hold(
     request, tell
         As for every experiment.
     contestants : sequence of Method
-        Rows of the table.
+        Rows of the table; a last one is the best pose that the published fitness has to offer.
     paper : mapping
         The paper's rows, by method and side of the window (m).
     judge : callable
@@ -41,6 +46,10 @@ def hold(
         As `Experiment` has them.
     """
     count = request.count(1000, 60)
+    best = oracle()
+    if best is not None:
+        contestants = (*contestants, best)
+        notes = (*notes, _BOUND)
     found = Findings(request)
     for pairs in pair_sets(request, count):
         bouts = duel.fight(request, contestants, pairs, count, tell)
@@ -53,5 +62,5 @@ def hold(
         summary=summary,
         counts={"trials per method and window": count},
         config=duel.described(contestants),
-        notes=notes,
+        notes=tuple(notes),
     )

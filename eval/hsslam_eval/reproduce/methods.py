@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from hsslam.matching import Matcher, create
+from hsslam.matching import Matcher, create, describe, names
 
 FITNESS: dict[str, Any] = {"fitness": "paper", "half_side": 0.0525, "resolution": 0.025, "refine": False}
 """What all published methods maximise, and then leave as it is."""
@@ -48,6 +48,9 @@ _PAPER: dict[str, dict[str, Any]] = {
     },
 }
 
+ORACLE = "exhaustive"
+"""The matcher that proves its optimum."""
+
 MEMORY_SIZE = 30
 """HMS as published."""
 
@@ -81,3 +84,10 @@ def published(name: str, label: str | None = None, **changed: Any) -> Method:
 def ours(name: str) -> Method:
     """A matcher at hsslam's defaults."""
     return Method(f"{name}, hsslam's defaults", name, {})
+
+
+def oracle() -> Method | None:
+    """The best that the published fitness has to offer, proven; None where no matcher that proves it runs."""
+    if ORACLE not in names() or not describe(ORACLE).available:
+        return None
+    return Method("the proven best pose", ORACLE, {**FITNESS, "tolerance": 0.0})

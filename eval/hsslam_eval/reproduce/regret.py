@@ -9,16 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsslam.matching import Matcher, MatchResult, create, describe, names
+from hsslam.matching import Matcher, MatchResult
 from hsslam_eval.protocols import TrialPair
 from hsslam_eval.reproduce.experiment import Tell, Value
-from hsslam_eval.reproduce.methods import FITNESS, Method
+from hsslam_eval.reproduce.methods import FITNESS, Method, oracle
 from hsslam_eval.statistics import bootstrap_interval
 from hsslam_eval.trial_config import TrialConfig
 from hsslam_eval.trials import trial_guess
-
-ORACLE = "exhaustive"
-"""The matcher that proves its optimum."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,19 +34,14 @@ class Optima:
     proven: float
 
 
-def oracle_available() -> bool:
-    """Whether there is a matcher that proves its optimum, and it runs here."""
-    return ORACLE in names() and describe(ORACLE).available
-
-
 def find_optima(pairs: Sequence[TrialPair], config: TrialConfig, tell: Tell) -> Optima | None:
     """Search every window exhaustively, around the guesses of `run_trials`; None where there is no oracle."""
-    if not oracle_available():
+    best = oracle()
+    if best is None:
         return None
-    oracle = create(ORACLE, {**FITNESS, "tolerance": 0.0})
     fitness, proven = np.empty(len(pairs)), 0
     for trial, pair in enumerate(pairs):
-        found = _match(oracle, pair, config, trial)
+        found = _match(best.matcher, pair, config, trial)
         fitness[trial] = found.diagnostics["fitness"]
         proven += bool(found.diagnostics["proven"])
         tell(f"proving the optima, L = {200 * config.half_xy:.0f} cm", trial + 1, len(pairs))
