@@ -11,7 +11,7 @@ from hsslam.datasets.simulator import simulate_pairs
 from hsslam.kernels.refine import NO_LINES, refine
 from hsslam.matching.interface import Reference, SearchWindow
 from hsslam.se2 import Points, between
-from hsslam.search.polish import REACHES, SCALES, SETTLE, polish
+from hsslam.search.polish import REACHES, SCALES, SETTLE, polish, scan_lines
 
 WALL = 0.12
 """Thickness of the wall between two rooms (m)."""
@@ -39,7 +39,7 @@ def test_lines_of_both_scans_are_better_than_those_of_one() -> None:
             SCALES,
         )
         one_way.append(np.hypot(*between(truth, found)[:2]))
-        found, _ = polish(reference, points, truth, truth, WIDE, 40)
+        found, _ = polish(reference, points, scan_lines(points), truth, truth, WIDE, 40)
         error = between(truth, found)
         both_ways.append(np.hypot(*error[:2]))
         turned.append(abs(math.degrees(error[2])))
@@ -53,8 +53,8 @@ def test_beams_that_graze_a_wall_tell_more_of_it() -> None:
     """Ranges of a SICK err by a centimetre along the beam; with all returns alike the mean error is 0.040 degrees."""
     turned = []
     for pair in simulate_pairs("office", 500, "sick-lms200", np.random.default_rng(3)):
-        reference, truth = Reference(pair.reference_points), pair.relative
-        found, _ = polish(reference, pair.scan_points, truth, truth, WIDE, 40)
+        reference, points, truth = Reference(pair.reference_points), pair.scan_points, pair.relative
+        found, _ = polish(reference, points, scan_lines(points), truth, truth, WIDE, 40)
         turned.append(abs(math.degrees(between(truth, found)[2])))
     assert np.mean(turned) < 0.0385
 
@@ -79,5 +79,5 @@ def test_the_two_sides_of_a_thin_wall_are_not_taken_for_one() -> None:
          along((3.0, half), (3.0, 5.0)), shared)
     )  # fmt: skip
     start = np.array([0.0, -0.4 * WALL, 0.0])
-    found, _ = polish(Reference(below), above, start, start, WIDE, 40)
+    found, _ = polish(Reference(below), above, scan_lines(above), start, start, WIDE, 40)
     assert found == pytest.approx(np.zeros(3), abs=0.01)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hsslam.kernels.refine import refine
 from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, GAP, lines_of
 from hsslam.matching.interface import Reference, SearchWindow
@@ -23,10 +26,21 @@ WINDOW_SLACK = 0.4
 Where a truth lies near the edge, noise alone carries the refined pose across it."""
 
 
+def scan_lines(points: Points) -> NDArray[np.float64]:
+    """Lines through a scan's (N, 2) points as `polish` wants them, see `hsslam.kernels.surface.lines_of`."""
+    return lines_of(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
+
+
 def polish(
-    reference: Reference, points: Points, start: Pose, guess: Pose, window: SearchWindow, iterations: int
+    reference: Reference,
+    points: Points,
+    lines: NDArray[np.float64],
+    start: Pose,
+    guess: Pose,
+    window: SearchWindow,
+    iterations: int,
 ) -> tuple[Pose, int]:
-    """Refine a pose by Gauss-Newton, points to lines and lines to points: the pose, iterations spent.
+    """Refine a pose by Gauss-Newton, points to lines and `scan_lines` to points: the pose, iterations spent.
 
     A refinement that leads away from the window is discarded: then the pose is ``start``.
     """
@@ -36,7 +50,7 @@ def polish(
         surface.nearest,
         surface.frame,
         points,
-        lines_of(points, GAP, FIT_SPAN, FIT_ROUGHNESS),
+        lines,
         start,
         iterations,
         SETTLE,

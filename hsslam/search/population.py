@@ -15,7 +15,8 @@ from hsslam.kernels.surface import Surface
 from hsslam.matching.interface import Estimate, Matcher, MatcherConfig, Reference, SearchWindow, clean
 from hsslam.se2 import Points, Pose
 from hsslam.search.fitness import FitnessName, HitFitness, build_raster
-from hsslam.search.polish import polish
+from hsslam.search.polish import polish, scan_lines
+from hsslam.search.slide import slide
 
 NO_TRACE: NDArray[np.float64] = np.empty((0, 4))
 """Nothing is traced."""
@@ -131,7 +132,7 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
         window: SearchWindow,
         rng: np.random.Generator,
     ) -> Estimate:
-        """Search, then refine; see `hsslam.search.polish.polish`."""
+        """Search, then refine; see `hsslam.search.polish` and, for corridors, `hsslam.search.slide`."""
         assert isinstance(reference, PopulationReference)
         wide = self.is_wide(window)
         raster = reference.coarse if wide else reference.raster
@@ -141,7 +142,17 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
         diagnostics: dict[str, Any] = {"fitness": fitness.share(hits)}
         if not self.config.refine:
             return Estimate(found, evaluations=evaluations, diagnostics=diagnostics)
-        refined, diagnostics["refine_iterations"] = polish(
-            reference, points, found, guess, window, self.config.refine_iterations
-        )
-        return Estimate(refined, evaluations=evaluations, diagnostics=diagnostics)
+        lines = scan_lines(points)
+
+        def refined(start: Pose) -> tuple[Pose, int]:
+            return polish(reference, points, lines, start, guess, window, self.config.refine_iterations)
+
+        pose, diagnostics["refine_iterations"] = refined(found)
+        if not wide:
+            every = HitFitness.of(raster, points)
+            elsewhere, looked = slide(every, lines, pose, guess, window, self.config.half_side)
+            evaluations += looked
+            if elsewhere is not None:
+                pose, spent = refined(elsewhere)
+                diagnostics["refine_iterations"] += spent
+        return Estimate(pose, evaluations=evaluations, diagnostics=diagnostics)

@@ -10,7 +10,7 @@ from pydantic import Field
 from hsslam.matching import Estimate, Matcher, Points, Pose, Reference, SearchWindow, clean
 from hsslam.search import PopulationConfig
 from hsslam.search.exhaustive import ExhaustiveReference, lattice_search, window_search
-from hsslam.search.polish import polish
+from hsslam.search.polish import polish, scan_lines
 
 
 class ExhaustiveConfig(PopulationConfig):
@@ -80,6 +80,6 @@ class Exhaustive(Matcher[ExhaustiveConfig]):
         if not config.refine:
             return Estimate(proof.pose, evaluations=proof.evaluations, diagnostics=diagnostics)
         refined, diagnostics["refine_iterations"] = polish(
-            reference, points, proof.pose, guess, window, config.refine_iterations
+            reference, points, scan_lines(points), proof.pose, guess, window, config.refine_iterations
         )
         return Estimate(refined, evaluations=proof.evaluations, diagnostics=diagnostics)
