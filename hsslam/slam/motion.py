@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from hsslam.config import GraphSection
 from hsslam.scan import LaserScan
 from hsslam.se2 import Pose, between, wrap
+from hsslam.slam.clock import ScanClock
 
 SILENT_AFTER = 2
 """Odometry is silent when it has not changed over this many scans while the matches moved."""
@@ -47,10 +48,10 @@ class MotionModel:
     def __init__(self, config: GraphSection) -> None:
         self._config = config
         self._odometry: Pose = np.zeros(3)
-        self._stamp = 0.0
         self._last_step: Pose = np.zeros(3)
         self._last_motion: Pose = np.zeros(3)
         self._last_seconds = 0.0
+        self._clock = ScanClock()
         self._silent = 0
 
     @property
@@ -73,22 +74,27 @@ class MotionModel:
 
     def start(self, scan: LaserScan) -> None:
         """Begin with the first scan."""
-        self._odometry, self._stamp = scan.odometry, scan.stamp
+        self._odometry = scan.odometry
+        self._clock.observe(scan.stamp)
 
     def predict(self, scan: LaserScan) -> tuple[Pose, NDArray[np.float64]]:
         """Motion since the last scan, in its frame, and the motion's covariance (3, 3)."""
         if not self.silent:
             moved = between(self._odometry, scan.odometry)
             return moved, self.covariance(moved)
-        moved = self._last_motion * self._stretch(scan.stamp - self._stamp)
+        moved = self._last_motion * self._stretch(scan.stamp)
         return moved, self.covariance(moved) + np.diag([0.05**2, 0.05**2, math.radians(3.0) ** 2])
 
     def velocity(self, scan: LaserScan) -> Pose:
-        """Velocity (m/s, m/s, rad/s) from the last scan to this, in the robot's frame; 0 where stamps do not tell."""
-        seconds = scan.stamp - self._stamp
-        if seconds <= 0.0:
+        """Velocity (m/s, m/s, rad/s) from the last scan to this, in the robot's frame; 0 where stamps do not tell.
+
+        A sweep takes no longer than the time to the next scan. Where odometry leaps, the last motion goes on.
+        """
+        seconds = self._clock.since_last(scan.stamp)
+        if seconds == 0.0:
             return np.zeros(3)
-        moved, _ = self.predict(scan)
+        seconds = max(seconds, abs(scan.geometry.time_increment) * len(scan.ranges))
+        moved = self._last_motion if self.leaps(scan) and self._last_seconds > 0.0 else self.predict(scan)[0]
         # The step of a motion at constant velocity: the logarithm of SE(2).
         half = 0.5 * moved[2]
         scale = half / math.tan(half) if abs(half) > 1e-9 else 1.0
@@ -102,8 +108,9 @@ class MotionModel:
         elif math.hypot(motion[0], motion[1]) + abs(motion[2]) > MOVING:
             self._silent += 1
         self._last_step = between(self._odometry, scan.odometry)
-        self._last_motion, self._last_seconds = motion, scan.stamp - self._stamp
-        self._odometry, self._stamp = scan.odometry, scan.stamp
+        self._last_motion, self._last_seconds = motion, self._clock.since_last(scan.stamp)
+        self._odometry = scan.odometry
+        self._clock.observe(scan.stamp)
 
     def covariance(self, moved: Pose) -> NDArray[np.float64]:
         """Covariance (3, 3) of an odometry motion."""
@@ -115,8 +122,9 @@ class MotionModel:
         out[2, 2] = theta
         return out
 
-    def _stretch(self, seconds: float) -> float:
+    def _stretch(self, stamp: float) -> float:
         """Time since the last scan over the time before it; 1 where stamps are no help."""
-        if self._last_seconds <= 0.0 or seconds <= 0.0:
+        seconds = self._clock.since_last(stamp)
+        if self._last_seconds == 0.0 or seconds == 0.0 or not self._clock.steady(stamp):
             return 1.0
         return min(max(seconds / self._last_seconds, 0.25), 4.0)

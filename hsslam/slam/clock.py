@@ -1,0 +1,50 @@
+"""The time from scan to scan, as far as stamps can be believed."""
+
+from __future__ import annotations
+
+RECENT = 100
+"""Scans over which the usual interval is averaged."""
+
+LONG = 30.0
+"""A longer interval than so many usual ones is a pause, and counts for no more."""
+
+SHORT = 0.5
+"""After an interval shorter than this share of the usual one the scan before must have been stamped late."""
+
+DOUBTED = 30
+"""Scans for which stamps are doubted once one was late."""
+
+
+class ScanClock:
+    """Tells the time between scans.
+
+    Recorders stamp scans when they get round to it: late, then several at once. The time between two such stamps
+    says nothing, that of many does. Intervals that are longer than usual are those of lost scans.
+    """
+
+    def __init__(self) -> None:
+        self._last = 0.0
+        self._usual = 0.0
+        self._intervals = -1
+        self._doubted = 0
+
+    def observe(self, stamp: float) -> None:
+        """Take note of a scan's stamp (s)."""
+        interval = stamp - self._last
+        self._doubted = DOUBTED if self._late(interval) else max(self._doubted - 1, 0)
+        self._last = stamp
+        self._intervals += 1
+        if self._intervals > 0:
+            counted = min(interval, LONG * self._usual) if self._usual > 0.0 else interval
+            self._usual += (counted - self._usual) / min(self._intervals, RECENT)
+
+    def steady(self, stamp: float) -> bool:
+        """Whether neither the scan of this stamp nor any of the last was stamped late."""
+        return self._doubted == 0 and not self._late(stamp - self._last)
+
+    def since_last(self, stamp: float) -> float:
+        """Time (s) from the last scan to this, or the usual time where stamps are not steady; 0 if unknown."""
+        return max(stamp - self._last if self.steady(stamp) else self._usual, 0.0)
+
+    def _late(self, interval: float) -> bool:
+        return self._intervals > 0 and interval < SHORT * self._usual
