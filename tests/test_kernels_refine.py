@@ -86,6 +86,16 @@ def test_too_few_points_tell_of_no_variances() -> None:
     assert (out == 1.0).all()
 
 
+def test_points_at_the_laser_itself_do_no_harm() -> None:
+    across, noise = np.linspace(-0.5, 0.5, 2 * ENOUGH), np.random.default_rng(0).normal(0.0, 0.02, 2 * ENOUGH)
+    wall = np.column_stack((np.full(2 * ENOUGH, 3.0), across))
+    surface = Surface.build(np.vstack((wall, [[0.0, 0.02], [0.0, -0.02]])))
+    points = np.vstack((wall + noise[:, None] * [1.0, 0.0], np.zeros((2 * ENOUGH, 2))))
+    out = np.empty(len(points))
+    variances_of(surface.pieces, surface.nearest, surface.frame, points, np.zeros(3), 0.08, out)
+    assert np.isfinite(out).all()
+
+
 @given(st.lists(st.floats(0.0, 0.999), min_size=1, max_size=300))
 @settings(deadline=None, max_examples=60)
 def test_a_histogram_tells_the_median_to_a_bin(values: list[float]) -> None:
