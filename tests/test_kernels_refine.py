@@ -78,6 +78,16 @@ def test_noise_that_grows_with_range_is_told() -> None:
     assert np.median(even) < 1.3
 
 
+def test_seen_from_elsewhere_ranges_tell_nothing_of_the_references_noise() -> None:
+    surface, out = Surface.build(hall(0.02, 0)), np.empty(340)
+    for x, grows in ((0.5, True), (2.0, False)):
+        points = hall(0.02, 1) - [x, 0.0]
+        variances_of(
+            surface.pieces, surface.nearest, surface.frame, points, np.array([x, 0.0, 0.0]), 0.08, out
+        )
+        assert (out.max() > 1.0) == grows
+
+
 def test_too_few_points_tell_of_no_variances() -> None:
     surface, points = Surface.build(corner()), corner()[:: 126 // ENOUGH]
     out = np.zeros(len(points))

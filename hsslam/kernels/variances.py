@@ -26,6 +26,10 @@ LEAST_GRAZING = 0.05
 FASTEST = 2.0
 """Power of the range with which a range's variance grows, at most: noise in proportion to the range."""
 
+NEARBY = 0.5
+"""Way from where the reference was seen from to where the scan was, at most, as a share of the near half's mean range:
+there the reference's returns are about as far away as the scan's, and as noisy."""
+
 ENOUGH = 20
 """Points, of the near and of the far half each, that tell of noise."""
 
@@ -44,7 +48,7 @@ def variances_of(
 
     Points nearer than the mean range are one half, those beyond the other; each half's noise is the median of its
     distances across the lines of the surface. Where the far half's is more, the variance is taken to grow with a
-    power of the range, from the near half's mean range on.
+    power of the range, from the near half's mean range on; but only where the scan was seen from `NEARBY`.
 
     Parameters
     ----------
@@ -93,8 +97,8 @@ def variances_of(
         return GRAZING
     near = max(median_of(counts[0], matched[0]), 0.5) * distance / BINS / MEDIAN
     far = max(median_of(counts[1], matched[1]), 0.5) * distance / BINS / MEDIAN
-    if far > near:
-        start = ranges[0] / matched[0]
+    start = ranges[0] / matched[0]
+    if far > near and pose[0] * pose[0] + pose[1] * pose[1] < NEARBY * NEARBY * start * start:
         growth = min(2.0 * math.log(far / near) / math.log(ranges[1] / matched[1] / start), FASTEST)
         for i in range(n):
             squared = (points[i, 0] * points[i, 0] + points[i, 1] * points[i, 1]) / (start * start)
