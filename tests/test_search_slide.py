@@ -57,7 +57,7 @@ def test_sliding_finds_the_pose_with_most_hits_along_a_corridor(off: float, turn
     fitness = HitFitness.of(raster, points)
     along = np.array([math.cos(turn), math.sin(turn), 0.0])
     start, window = truth + off * along, SearchWindow(0.31, 0.31, 0.2)
-    found, looked = slide(fitness, scan_lines(points), start, truth, window, 0.05)
+    found, looked = slide(raster, points, scan_lines(points), start, truth, window, 0.05)
 
     def hits(pose: Pose) -> int:
         return count_hits(raster.cells, raster.frame, fitness.xs, fitness.ys, *pose, 0)
@@ -77,14 +77,14 @@ def test_sliding_finds_the_pose_with_most_hits_along_a_corridor(off: float, turn
 
 def test_nothing_is_looked_for_where_every_direction_is_fixed() -> None:
     room = np.vstack((corridor(length=4.0), 3.0 * corridor(length=2.0)[:, ::-1]))
-    fitness = HitFitness.of(PopulationReference(room, PopulationConfig()).raster, room)
-    assert slide(fitness, scan_lines(room), np.zeros(3), np.zeros(3), WINDOW, 0.05) == (None, 0)
+    raster = PopulationReference(room, PopulationConfig()).raster
+    assert slide(raster, room, scan_lines(room), np.zeros(3), np.zeros(3), WINDOW, 0.05) == (None, 0)
 
 
 def test_a_plain_corridor_moves_no_pose() -> None:
     points = corridor(closed=False, length=40.0)[::2]
-    fitness = HitFitness.of(PopulationReference(points, PopulationConfig()).raster, points)
-    found, looked = slide(fitness, scan_lines(points), np.zeros(3), np.zeros(3), WINDOW, 0.05)
+    raster = PopulationReference(points, PopulationConfig()).raster
+    found, looked = slide(raster, points, scan_lines(points), np.zeros(3), np.zeros(3), WINDOW, 0.05)
     assert found is None
     assert looked > 1
 

@@ -149,8 +149,7 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
 
         pose, diagnostics["refine_iterations"] = refined(found)
         if not wide:
-            every = HitFitness.of(raster, points)
-            elsewhere, looked = slide(every, lines, pose, guess, window, self.config.half_side)
+            elsewhere, looked = slide(raster, points, lines, pose, guess, window, self.config.half_side)
             evaluations += looked
             if elsewhere is not None:
                 pose, spent = refined(elsewhere)

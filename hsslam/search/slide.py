@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from hsslam.jit import kernel
 from hsslam.kernels.fitness import evaluate, scratch
+from hsslam.kernels.raster import Raster
 from hsslam.matching.interface import SearchWindow
-from hsslam.se2 import Pose
+from hsslam.se2 import Points, Pose
 from hsslam.search.fitness import HitFitness
 
 WEAK = 0.2
@@ -21,7 +22,8 @@ GAIN = 0.04
 
 
 def slide(
-    fitness: HitFitness,
+    raster: Raster,
+    points: Points,
     lines: NDArray[np.float64],
     pose: Pose,
     guess: Pose,
@@ -35,8 +37,10 @@ def slide(
 
     Parameters
     ----------
-    fitness : HitFitness
-        Of all the scan's points.
+    raster : Raster
+        Of the reference.
+    points : Points
+        (N, 2) m, the scan.
     lines : float64 (N, 3)
         The scan's, see `hsslam.kernels.surface.lines_of`.
     pose, guess : Pose
@@ -51,8 +55,12 @@ def slide(
     (Pose or None, int)
         The pose with most hits, if it has `GAIN` more than ``pose``, and how many poses were looked at.
     """
+    direction = weak_direction(lines)
+    if math.isnan(direction):
+        return None, 0
+    fitness = HitFitness.of(raster, points)
     found, gained, spent = _slide(
-        fitness.cells, fitness.frame, fitness.scaled, fitness.count, lines, pose, guess, window.half, step
+        fitness.cells, fitness.frame, fitness.scaled, fitness.count, direction, pose, guess, window.half, step
     )
     return (found if fitness.share(gained) > GAIN else None), spent
 
@@ -78,17 +86,14 @@ def _slide(
     frame: NDArray[np.float64],
     scaled: NDArray[np.float32],
     count: int,
-    lines: NDArray[np.float64],
+    direction: float,
     pose: Pose,
     guess: Pose,
     half: NDArray[np.float64],
     step: float,
 ) -> tuple[Pose, int, int]:
     """See `slide`: the best pose, its hits beyond those of ``pose``, poses looked at."""
-    direction = weak_direction(lines)
     best = pose.copy()
-    if math.isnan(direction):
-        return best, 0, 0
     flat, xs, ys, index = cells.reshape(cells.size), scaled[0], scaled[1], scratch()
     x, y, theta = pose
     here = evaluate(flat, cells.shape, frame, xs, ys, count, x, y, theta, 0, index)
