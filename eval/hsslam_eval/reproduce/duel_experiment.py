@@ -13,8 +13,9 @@ from hsslam_eval.reproduce.findings import Findings
 from hsslam_eval.reproduce.methods import Method, oracle
 
 _BOUND = (
-    "The proven best pose is what a search would find that never failed. Where even that succeeds less often than the "
-    "paper's methods did, it is the fitness that limits them on these data: a search of it does better by luck alone."
+    "The proven best pose of the published fitness is what a search would find that never failed. Where even that "
+    "succeeds less often than the paper's methods did, the fitness limits them on these data: a search does better by "
+    "luck alone."
 )
 
 

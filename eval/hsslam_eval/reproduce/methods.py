@@ -90,4 +90,4 @@ def oracle() -> Method | None:
     """The best that the published fitness has to offer, proven; None where no matcher that proves it runs."""
     if ORACLE not in names() or not describe(ORACLE).available:
         return None
-    return Method("the proven best pose", ORACLE, {**FITNESS, "tolerance": 0.0})
+    return Method("best pose of this fitness, proven", ORACLE, {**FITNESS, "tolerance": 0.0})
