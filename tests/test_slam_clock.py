@@ -43,7 +43,7 @@ def late(stamps: Stamps, every: float, seed: int = 0) -> Stamps:
     return looks[np.searchsorted(looks, stamps)] + 1e-3 * np.arange(len(stamps)) % 7e-3
 
 
-@given(st.floats(0.01, 2.0), st.sets(st.integers(3, 80), max_size=8))
+@given(st.floats(0.01, 2.0), st.sets(st.integers(20, 80), max_size=8))
 @settings(deadline=None, max_examples=40)
 def test_steady_stamps_are_believed_and_lost_scans_leave_gaps(period: float, lost: set[int]) -> None:
     stamps = np.delete(in_turn(period, 100), sorted(lost))
