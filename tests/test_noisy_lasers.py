@@ -140,6 +140,7 @@ def test_along_bare_walls_a_noisy_laser_does_not_lead_the_robot_astray() -> None
             between_many(online[:1].repeat(240, axis=0), online),
         )
         farthest.append(np.hypot(error[:, 0], error[:, 1]).max())
-    # Single runs end anywhere between 0.1 and 0.8 m; where the window counted as knowledge the mean was 0.53, and
-    # odometry alone is 2 m off.
+    # Of 28 runs none ended more than 0.81 m off, mean 0.35; where the window counted as knowledge the mean was 0.53,
+    # and odometry alone is 2 m off.
+    assert np.max(farthest) < 1.0
     assert np.mean(farthest) < 0.45
