@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import TrackerSection
-from hsslam.matching.interface import Matcher, MatchResult, SearchWindow
+from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
 from hsslam.se2 import Points, Pose, wrap
 from hsslam.slam.fusion import GATE, squared_mahalanobis
-from hsslam.slam.motion import LEAP, way
+from hsslam.slam.motion import way
 from hsslam.slam.stopwatch import Stopwatch
-from hsslam.slam.submap import GrowingSubmap
 from hsslam.slam.windows import AGREEING, foreseen_window, known_within, match_within, search_window
 
 EDGE = 0.9
@@ -23,9 +22,6 @@ EDGE = 0.9
 
 EDGE_GAIN = 0.02
 """An answer beyond the window is believed only if its score is this much higher: among many places one seems better."""
-
-AGREED = 0.97
-"""A low score is no reason for doubt if this share of the returns that tell for or against the pose tell for it."""
 
 SETTLINGS = 4
 """How often an answer is followed to the edge of the window around it, at most."""
@@ -57,8 +53,6 @@ class Expectation:
         Where it is if the robot moved as it did before.
     told : bool
         Whether odometry tells of motion: an outage looks like a robot at rest, and cannot be contradicted.
-    silent : bool
-        Whether odometry has stopped telling of motion, so that ``pose`` is the last motion once more.
     leaps : bool
         Whether odometry's motion is unlike the one before.
     score : float
@@ -69,7 +63,6 @@ class Expectation:
     covariance: NDArray[np.float64]
     repeated: Pose
     told: bool
-    silent: bool
     leaps: bool
     score: float
 
@@ -96,12 +89,10 @@ class Locator:
         Windows, and the scores below which a match is doubted.
     matcher : Matcher
         Any.
-    submap : GrowingSubmap
-        Prepared by the matcher.
+    reference : Reference
+        The submap, prepared by the matcher.
     points : Points
         (N, 2) m, the scan's returns in the robot's frame.
-    laser : Pose
-        The laser that they come from, there.
     rng : numpy.random.Generator
         The scan's own.
     stopwatch : Stopwatch
@@ -112,18 +103,15 @@ class Locator:
         self,
         rules: TrackerSection,
         matcher: Matcher[Any],
-        submap: GrowingSubmap,
+        reference: Reference,
         points: Points,
-        laser: Pose,
         rng: np.random.Generator,
         stopwatch: Stopwatch,
     ) -> None:
         self._rules = rules
         self._matcher = matcher
-        self._reference = submap.reference
-        self._sight = submap.sight
+        self._reference = reference
         self._points = points
-        self._laser = laser
         self._rng = rng
         self._stopwatch = stopwatch
         self._window = search_window(rules.window)
@@ -139,11 +127,10 @@ class Locator:
         if _cut_off(found, expected, window):
             with self._stopwatch.measure("recover"):
                 found = self._look_further(expected, found)
-        contradicted = (expected.told or expected.silent) and _contradicts(found, expected)
-        if contradicted or (expected.told and self._doubtful(found, expected)):
+        if expected.told and (_contradicts(found, expected) or self._doubtful(found)):
             with self._stopwatch.measure("recover"):
                 found = self._agree(expected, found)
-        if self._doubtful(found, expected):
+        if self._doubtful(found):
             with self._stopwatch.measure("recover"):
                 found = self._recover(expected, found)
         elif expected.leaps and found.score < 1.0 - LEAP_GAIN:
@@ -164,49 +151,19 @@ class Locator:
     def _known_within(self, window: SearchWindow, result: MatchResult) -> MatchResult:
         return known_within(self._matcher, window, self._reference, self._points, result)
 
-    def _doubtful(self, result: MatchResult, expected: Expectation) -> bool:
-        """Whether an answer calls for another: most do that explain little, but not where there is much new to see."""
-        if not result.converged:
-            return True
-        if result.score >= self._rules.recovery_score:
-            return False
-        goes_on = way(result.pose, expected.repeated) <= LEAP
-        return not (goes_on and self._explains_enough(result) and self._agreement(result) >= AGREED)
-
-    def _explains_enough(self, result: MatchResult) -> bool:
-        return result.score >= self._rules.min_score
-
-    def _agreement(self, result: MatchResult) -> float:
-        reference, distance = self._reference, self._matcher.config.score_distance
-        return self._sight.agreement(reference, self._points, self._laser, result.pose, distance)
+    def _doubtful(self, result: MatchResult) -> bool:
+        return not result.converged or result.score < self._rules.recovery_score
 
     def _look_further(self, expected: Expectation, first: MatchResult) -> MatchResult:
-        """Search the widest window around the prediction: what a narrow one found at its edge was cut off by it.
-
-        Where odometry is no guide the robot has most likely gone on as it went: a wide window finds, along a wall,
-        whatever place has the least to see that is new.
-        """
-        if expected.leaps or not expected.told:
-            on = self._match(expected.repeated, self._window)
-            inside = on.converged and not _at_edge(_difference(on.pose, expected.repeated), self._window)
-            if inside and not self._doubtful(on, expected):
-                return on
+        """Search the widest window around the prediction: what a narrow one found at its edge was cut off by it."""
         wide = self._match(expected.pose, self._widest)
         better = wide.converged and (not first.converged or wide.score > first.score + EDGE_GAIN)
         return self._settled(wide if better else first)
 
     def _agree(self, expected: Expectation, first: MatchResult) -> MatchResult:
-        """Search only where odometry may be right: what fits about as well there is likelier than what denies it.
-
-        So is what fits less well only because it sees more that is new.
-        """
+        """Search only where odometry may be right: what fits about as well there is likelier than what denies it."""
         near = self._match(expected.pose, expected.window(AGREEING, self._window))
-        if not near.converged:
-            return first
-        about_as_well = expected.told and near.score > first.score - expected.least_gain(first.pose)
-        if not about_as_well and not (
-            self._explains_enough(near) and self._agreement(near) >= self._agreement(first)
-        ):
+        if not near.converged or near.score <= first.score - expected.least_gain(first.pose):
             return first
         # What so narrow a window adds to the covariance is odometry's, and odometry is weighed by itself.
         return self._known_within(self._window, near)
@@ -220,12 +177,10 @@ class Locator:
     def _recover(self, expected: Expectation, first: MatchResult) -> MatchResult:
         """Doubt odometry: try the last motion once more as the prediction, then a wide window around it."""
         best = self._match(expected.repeated, self._window)
-        if self._doubtful(best, expected):
+        if self._doubtful(best):
             best = self._match(expected.repeated, self._widest)
-        if not best.converged:
-            return first
-        scores_more = best.score > first.score + expected.least_gain(best.pose)
-        if not first.converged or (scores_more and self._agreement(best) >= self._agreement(first)):
+        gain = expected.least_gain(best.pose)
+        if best.converged and (not first.converged or best.score > first.score + gain):
             return self._settled(best)
         return first
 
@@ -246,8 +201,7 @@ def _cut_off(result: MatchResult, expected: Expectation, window: SearchWindow) -
     """Whether a better answer may lie beyond the edge of the window around the expected pose."""
     off = _difference(result.pose, expected.pose)
     direction = result.diagnostics.get("degenerate_direction")
-    sure = expected.told and not expected.leaps
-    if sure and direction is not None and result.score >= expected.score - USUAL:
+    if expected.told and direction is not None and result.score >= expected.score - USUAL:
         # All places along it are as good, those at the edge too: a bare wall's are, if the scan fits as ever.
         along = np.array([math.cos(direction), math.sin(direction), 0.0])
         off -= (off @ along) * along

@@ -106,7 +106,7 @@ class Slam:
         yield self._record(scan, newest, tracked)
         if not self._tracker.wants_keyframe(tracked):
             return
-        self._tracker.add_keyframe(scan.robot_points, scan.laser_pose, tracked)
+        self._tracker.add_keyframe(scan.robot_points, tracked)
         self._graph.add_keyframe(tracked.relative, tracked.covariance)
         self._scans.becomes_keyframe(newest + 1)
         yield self._keep(scan)

@@ -9,7 +9,6 @@ import numpy as np
 
 from hsslam.matching.interface import Matcher, Reference
 from hsslam.se2 import Points, Pose, Poses, between, compose, transform
-from hsslam.slam.sight import Sight
 
 
 def merge(points: Sequence[Points], poses: Poses, origin: Pose) -> Points:
@@ -42,26 +41,20 @@ class GrowingSubmap:
     matcher : Matcher
         Prepares and extends the reference.
     points : Points
-        (N, 2) m, of the first keyframe, in the robot's frame.
-    laser : Pose
-        Its laser, there.
+        (N, 2) m, of the first keyframe.
     """
 
-    def __init__(self, matcher: Matcher[Any], points: Points, laser: Pose) -> None:
+    def __init__(self, matcher: Matcher[Any], points: Points) -> None:
         self._matcher = matcher
         self.reference: Reference = matcher.prepare(points)
         self.newest: Pose = np.zeros(3)
         """The newest keyframe, seen from the first."""
         self.size = 1
-        self.sight = Sight()
-        """What its keyframes saw."""
-        self.sight.add(points, laser, self.newest)
 
-    def add(self, points: Points, laser: Pose, relative: Pose) -> None:
-        """Add a keyframe's (N, 2) points and its laser; ``relative`` is the keyframe seen from the newest one."""
+    def add(self, points: Points, relative: Pose) -> None:
+        """Add a keyframe's (N, 2) points; ``relative`` is the keyframe seen from the newest one."""
         self.newest = compose(self.newest, relative)
         self.reference = self._matcher.extend(self.reference, transform(self.newest, points))
-        self.sight.add(points, laser, self.newest)
         self.size += 1
 
 
@@ -84,21 +77,21 @@ class LocalSubmap:
         self._size = size
         self._growing: list[GrowingSubmap] = []
 
-    def add(self, points: Points, laser: Pose, relative: Pose) -> None:
-        """Add a keyframe's (N, 2) points and its laser; ``relative``: the keyframe seen from the newest one, if any."""
+    def add(self, points: Points, relative: Pose) -> None:
+        """Add a keyframe's (N, 2) points; ``relative`` is the keyframe seen from the newest one, if there is one."""
         for submap in self._growing:
-            submap.add(points, laser, relative)
+            submap.add(points, relative)
         if not self._growing or self._growing[-1].size > self._size // 2:
-            self._growing.append(GrowingSubmap(self._matcher, points, laser))
+            self._growing.append(GrowingSubmap(self._matcher, points))
         if self._growing[0].size > self._size:
             del self._growing[0]
 
     @property
-    def current(self) -> GrowingSubmap:
+    def reference(self) -> Reference:
         """What to match against."""
-        return self._growing[0]
+        return self._growing[0].reference
 
     @property
     def newest(self) -> Pose:
-        """The newest keyframe in the frame of the current submap."""
-        return self.current.newest
+        """The newest keyframe in the frame of `reference`."""
+        return self._growing[0].newest

@@ -71,7 +71,7 @@ class Tracker:
     def start(self, scan: LaserScan, points: Points) -> None:
         """Begin with the first scan, the first keyframe."""
         self._motion.start(scan)
-        self._submap.add(points, scan.laser_pose, np.zeros(3))
+        self._submap.add(points, np.zeros(3))
 
     def deskewed(self, scan: LaserScan) -> LaserScan:
         """The next scan, with the velocity at which its beams went round; as it is where that is not to be undone."""
@@ -112,10 +112,10 @@ class Tracker:
         far = math.hypot(x, y) >= share * rules.distance
         return far or abs(theta) >= share * math.radians(rules.angle_deg)
 
-    def add_keyframe(self, points: Points, laser: Pose, tracked: TrackedScan) -> None:
-        """Make the last scan the newest keyframe; its (N, 2) points and its laser are in the robot's frame."""
+    def add_keyframe(self, points: Points, tracked: TrackedScan) -> None:
+        """Make the last scan the newest keyframe."""
         with self._stopwatch.measure("submap"):
-            self._submap.add(points, laser, tracked.relative)
+            self._submap.add(points, tracked.relative)
         heading = self._pose[2]
         self._pose = self._submap.newest
         self._covariance = rotated(self._covariance, heading - self._pose[2])
@@ -130,14 +130,13 @@ class Tracker:
             covariance=prior,
             repeated=compose(self._pose, self._motion.last_motion),
             told=told,
-            silent=self._motion.silent,
             leaps=told and self._motion.leaps(scan),
             score=self._usual_score,
         )
         rng = generator(self._config.seed, Purpose.TRACK, scan.index)
-        submap = self._submap.current
-        locator = Locator(rules, self._matcher, submap, points, scan.laser_pose, rng, self._stopwatch)
-        result = locator.locate(expected)
+        result = Locator(rules, self._matcher, self._submap.reference, points, rng, self._stopwatch).locate(
+            expected
+        )
         matched = result.converged and result.score >= rules.min_score
         if not matched:
             pose, covariance = predicted, prior
