@@ -13,6 +13,7 @@ from hsslam.datasets.simulator import SimulatedDataset
 from hsslam.matching import create
 from hsslam.matching.interface import SearchWindow
 from hsslam.se2 import Points, Poses, between, compose, pose, wrap
+from hsslam.search.exhaustive import ExhaustiveReference, lattice_search
 from hsslam.slam.far import CELL, FarSearch
 from hsslam.slam.loops import Candidate, LoopCloser
 from hsslam.slam.stopwatch import Stopwatch
@@ -33,6 +34,16 @@ def test_without_points_the_guess_is_all_there_is() -> None:
     nothing, guess = np.empty((0, 2)), pose(1.0, 2.0, 0.3)
     assert (FarSearch(PLACE).best(nothing, guess, WIDE) == guess).all()
     assert (FarSearch(nothing).best(PLACE, guess, WIDE) == guess).all()
+
+
+def test_a_search_that_nothing_settles_ends_with_the_guess() -> None:
+    """Three points fit everywhere: every pose of the window would have to be looked at."""
+    reference = ExhaustiveReference(PLACE, "likelihood", CELL, CELL)
+    fitness = reference.fitness_of(PLACE[:3])
+    proof = lattice_search(reference, fitness, np.zeros(3), WIDE, budget=50)
+    assert proof.evaluations < 50 + math.prod(2 * np.floor(WIDE.half / CELL) + 1)
+    assert proof.bound == 1.0
+    assert (proof.pose == 0.0).all()
 
 
 def test_other_answers_are_looked_for_on_every_side_and_outside_of_what_is_near() -> None:

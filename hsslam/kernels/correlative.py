@@ -146,6 +146,7 @@ def best_of_lattice(
     guess: Pose,
     counts: NDArray[np.int64],
     turn: float,
+    budget: int,
 ) -> tuple[Pose, int, int]:
     """Find the pose of a lattice where a scan's points are worth most, and prove it.
 
@@ -168,11 +169,14 @@ def best_of_lattice(
         Steps from the guess to the lattice's edge, each way.
     turn : float
         Step in heading (rad); at most what moves the farthest point by a cell.
+    budget : int
+        Blocks and poses to look at before giving up, about.
 
     Returns
     -------
     (Pose, int, int)
-        Best pose, its worth, and how many blocks and poses were looked at.
+        Best pose, its worth, and how many blocks and poses were looked at. With the budget spent, the best of those
+        looked at; the guess, worth -1, if there was no pose among them.
     """
     n, levels, most = xs.shape[0], blocks.shape[0], int(frame[3])
     rounding = rounding_of(pooled, xs, ys)
@@ -197,7 +201,7 @@ def best_of_lattice(
     # A block is named by its lowest pose in steps, and has the level of its parts; the first is the whole lattice.
     heap = push(np.empty((1024, 5)), 0, most * n + 1, 0, 0.0, 0.0, 0.0)
     size = 1
-    while size > 0 and heap[0, 0] >= best_worth + 1:
+    while size > 0 and heap[0, 0] >= best_worth + 1 and evaluations < budget:
         level = int(heap[0, 1])
         x0, y0, t0 = int(heap[0, 2]), int(heap[0, 3]), int(heap[0, 4])
         pop(heap, size)

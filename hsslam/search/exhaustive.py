@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -69,21 +70,25 @@ class ExhaustiveReference(Reference):
 
 
 def lattice_search(
-    reference: ExhaustiveReference, fitness: HitFitness, guess: Pose, window: SearchWindow
+    reference: ExhaustiveReference,
+    fitness: HitFitness,
+    guess: Pose,
+    window: SearchWindow,
+    budget: int = sys.maxsize,
 ) -> Proof:
     """Find the best pose of the lattice around a guess: steps of a raster cell, and of a cell's turn.
 
     A cell's turn is the rotation that moves the scan's farthest point by a cell. The bound is of the lattice
-    only.
+    only. With a ``budget`` of blocks and poses spent, nothing is proven: the best of those looked at, or the guess.
     """
     turn = cell_turn(fitness)
     cell = 1.0 / fitness.frame[2]
     counts = np.floor(window.half / np.array([cell, cell, turn]) + 1e-9).astype(np.int64)
     pose, worth, evaluations = best_of_lattice(
-        reference.pooled, _SIDES, _BLOCKS, fitness.frame, fitness.xs, fitness.ys, guess, counts, turn
+        reference.pooled, _SIDES, _BLOCKS, fitness.frame, fitness.xs, fitness.ys, guess, counts, turn, budget
     )
-    share = float(fitness.share(worth))
-    return Proof(pose, share, share, evaluations)
+    share = float(fitness.share(max(worth, 0)))
+    return Proof(pose, share, share if evaluations < budget else 1.0, evaluations)
 
 
 def window_search(

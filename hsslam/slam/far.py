@@ -25,6 +25,9 @@ RANGE = 30.0
 MOST_POINTS = 120
 """Points of the scan that are looked at, spread over it."""
 
+BUDGET = 200_000
+"""Blocks and poses looked at, at most: where so many seem as good, none of them is the answer."""
+
 NEAR = SearchWindow(0.5, 0.5, math.radians(5.0))
 """Where the matcher looks, around an answer of the coarse search; so wide that a direction that is open shows."""
 
@@ -47,7 +50,7 @@ class FarSearch:
         if len(points) == 0 or len(self._reference.points) == 0:
             return guess.copy()
         fitness = HitFitness.of(self._reference.raster, points, MOST_POINTS)
-        pose = lattice_search(self._reference, fitness, guess, window).pose.copy()
+        pose = lattice_search(self._reference, fitness, guess, window, BUDGET).pose.copy()
         pose[2] = wrap(pose[2])
         return pose
 
