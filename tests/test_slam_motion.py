@@ -29,7 +29,7 @@ def silent_model(step: NDArray[np.float64], seconds: float = 0.25) -> MotionMode
     model = MotionModel(RULES)
     model.start(scan(0.0, np.zeros(3)))
     for i in range(1, 4):
-        model.observe(scan(i * seconds, np.zeros(3)), step)
+        model.observe(scan(i * seconds, np.zeros(3)), step, matched=True)
     return model
 
 
@@ -58,7 +58,7 @@ def test_the_last_motion_stands_in_until_odometry_speaks_again() -> None:
     moved, covariance = model.predict(scan(1.0, np.zeros(3)))
     assert moved == pytest.approx(step)
     assert covariance[0, 0] > model.covariance(step)[0, 0]
-    model.observe(scan(1.0, pose(0.1, 0.0, 0.0)), step)
+    model.observe(scan(1.0, pose(0.1, 0.0, 0.0)), step, matched=True)
     assert not model.silent
     again, _ = model.predict(scan(1.25, pose(0.3, 0.0, 0.0)))
     assert again == pytest.approx(pose(0.2, 0.0, 0.0))
@@ -72,6 +72,16 @@ def test_the_last_motion_is_stretched_to_the_time_that_passed(seconds: float, fa
     step = pose(0.1, 0.02, 0.05)
     moved, _ = silent_model(step).predict(scan(0.75 + seconds, np.zeros(3)))
     assert moved == pytest.approx(factor * step)
+
+
+def test_nobody_goes_on_for_ever_without_being_seen() -> None:
+    model, way = silent_model(pose(0.15, 0.0, 0.0)), 0.0
+    for i in range(200):
+        unseen = scan(1.0 + 0.25 * i, np.zeros(3))
+        moved, _ = model.predict(unseen)
+        model.observe(unseen, moved, matched=False)
+        way += moved[0]
+    assert 0.15 < way < 1.0
 
 
 def largest_error(result: NDArray[np.float64], truth: NDArray[np.float64]) -> float:

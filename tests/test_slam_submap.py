@@ -36,9 +36,9 @@ def test_merge_sees_all_from_one_pose_and_keeps_the_order() -> None:
 
 
 def test_a_growing_submap_holds_every_keyframe_in_the_frame_of_the_first() -> None:
-    submap = GrowingSubmap(create("hide"), points_of(0))
+    submap = GrowingSubmap(create("hide"), points_of(0), np.zeros(3))
     for k, step in enumerate(STEPS[:4], start=1):
-        submap.add(points_of(k), step)
+        submap.add(points_of(k), np.zeros(3), step)
     poses = way(STEPS[:4])
     assert submap.size == 5
     assert submap.newest == pytest.approx(poses[-1])
@@ -50,11 +50,11 @@ def test_a_growing_submap_holds_every_keyframe_in_the_frame_of_the_first() -> No
 def test_a_local_submap_holds_the_newest_keyframes_half_to_full(size: int) -> None:
     submap, poses = LocalSubmap(create("hide"), size), way(STEPS)
     for k in range(len(poses)):
-        submap.add(points_of(k), STEPS[k - 1] if k else np.zeros(3))
-        held = len(submap.reference.points) // 3
+        submap.add(points_of(k), np.zeros(3), STEPS[k - 1] if k else np.zeros(3))
+        held = len(submap.current.reference.points) // 3
         assert min(k + 1, math.ceil(size / 2)) <= held <= size
         first = k + 1 - held
         newest = between(poses[first], poses[k])
         assert submap.newest == pytest.approx(newest, abs=1e-9)
         expected = merge([points_of(i) for i in range(first, k + 1)], poses[first : k + 1], poses[first])
-        np.testing.assert_allclose(submap.reference.points, expected, atol=1e-9)
+        np.testing.assert_allclose(submap.current.reference.points, expected, atol=1e-9)

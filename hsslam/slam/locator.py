@@ -10,15 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import TrackerSection
-from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
-from hsslam.se2 import Points, Pose, wrap
+from hsslam.matching.interface import MINIMUM_POINTS, Matcher, MatchResult, SearchWindow
+from hsslam.se2 import Points, Pose
 from hsslam.slam.fusion import GATE, squared_mahalanobis
 from hsslam.slam.motion import way
 from hsslam.slam.stopwatch import Stopwatch
-from hsslam.slam.windows import AGREEING, foreseen_window, known_within, match_within, search_window
-
-EDGE = 0.9
-"""An answer this far from the middle of the window, as a share of its half side, may be the edge of a better one."""
+from hsslam.slam.submap import GrowingSubmap
+from hsslam.slam.windows import (
+    AGREEING,
+    at_edge,
+    difference,
+    foreseen_window,
+    known_within,
+    match_within,
+    search_window,
+)
 
 EDGE_GAIN = 0.02
 """An answer beyond the window is believed only if its score is this much higher: among many places one seems better."""
@@ -34,6 +40,9 @@ RECOVERY_GAIN = 0.12
 
 LEAP_GAIN = 0.06
 """By this much, where odometry leaps and the answer goes on as the robot went."""
+
+IMPOSSIBLE = 1.0
+"""By none at all, where odometry leaps further than this (m + rad) from where the robot was going."""
 
 STEADY = 2.0
 """This many times as much where odometry goes on as the robot went, and the answer does not: robots do not leap."""
@@ -89,8 +98,8 @@ class Locator:
         Windows, and the scores below which a match is doubted.
     matcher : Matcher
         Any.
-    reference : Reference
-        The submap, prepared by the matcher.
+    submap : GrowingSubmap
+        Prepared by the matcher.
     points : Points
         (N, 2) m, the scan's returns in the robot's frame.
     rng : numpy.random.Generator
@@ -103,14 +112,15 @@ class Locator:
         self,
         rules: TrackerSection,
         matcher: Matcher[Any],
-        reference: Reference,
+        submap: GrowingSubmap,
         points: Points,
         rng: np.random.Generator,
         stopwatch: Stopwatch,
     ) -> None:
         self._rules = rules
         self._matcher = matcher
-        self._reference = reference
+        self._reference = submap.reference
+        self._free_space = submap.free_space
         self._points = points
         self._rng = rng
         self._stopwatch = stopwatch
@@ -124,7 +134,10 @@ class Locator:
         window = expected.window(self._window, self._widest)
         with self._stopwatch.measure("track"):
             found = self._match(expected.pose, window)
-        if _cut_off(found, expected, window):
+            cut_off = _cut_off(found, expected, window)
+            if not (cut_off or expected.leaps):
+                found = self._without_passers_by(expected, window, found)
+        if cut_off:
             with self._stopwatch.measure("recover"):
                 found = self._look_further(expected, found)
         if expected.told and (_contradicts(found, expected) or self._doubtful(found)):
@@ -133,7 +146,7 @@ class Locator:
         if self._doubtful(found):
             with self._stopwatch.measure("recover"):
                 found = self._recover(expected, found)
-        elif expected.leaps and found.score < 1.0 - LEAP_GAIN:
+        elif expected.leaps and found.score < 1.0:
             with self._stopwatch.measure("recover"):
                 found = self._steadier(expected, found)
         if "degenerate_direction" in found.diagnostics:
@@ -154,6 +167,18 @@ class Locator:
     def _doubtful(self, result: MatchResult) -> bool:
         return not result.converged or result.score < self._rules.recovery_score
 
+    def _without_passers_by(
+        self, expected: Expectation, window: SearchWindow, first: MatchResult
+    ) -> MatchResult:
+        """Match again without the returns that are in free space, whether the expectation is right or the match."""
+        in_free_space = self._free_space.holds(self._points, expected.pose)
+        in_free_space &= self._free_space.holds(self._points, first.pose)
+        count = np.count_nonzero(in_free_space)
+        if count == 0 or len(self._points) - count < MINIMUM_POINTS:
+            return first
+        self._points = self._points[~in_free_space]
+        return self._match(expected.pose, window)
+
     def _look_further(self, expected: Expectation, first: MatchResult) -> MatchResult:
         """Search the widest window around the prediction: what a narrow one found at its edge was cut off by it."""
         wide = self._match(expected.pose, self._widest)
@@ -171,7 +196,8 @@ class Locator:
     def _steadier(self, expected: Expectation, first: MatchResult) -> MatchResult:
         """Where odometry leaps, try the last motion once more: a jump may reach further than any window."""
         best = self._match(expected.repeated, self._window)
-        better = best.converged and best.score > first.score + LEAP_GAIN
+        gain = LEAP_GAIN if way(expected.pose, expected.repeated) < IMPOSSIBLE else 0.0
+        better = best.converged and best.score > first.score + gain
         return best if better else first
 
     def _recover(self, expected: Expectation, first: MatchResult) -> MatchResult:
@@ -190,35 +216,25 @@ class Locator:
             near = self._match(found.pose, self._window)
             if not near.converged or near.score < found.score - EDGE_GAIN:
                 return found
-            moved = _difference(near.pose, found.pose)
+            moved = difference(near.pose, found.pose)
             found = self._known_within(self._widest, near)
-            if not _at_edge(moved, self._window):
+            if not at_edge(moved, self._window):
                 break
         return found
 
 
 def _cut_off(result: MatchResult, expected: Expectation, window: SearchWindow) -> bool:
     """Whether a better answer may lie beyond the edge of the window around the expected pose."""
-    off = _difference(result.pose, expected.pose)
+    off = difference(result.pose, expected.pose)
     direction = result.diagnostics.get("degenerate_direction")
     if expected.told and direction is not None and result.score >= expected.score - USUAL:
         # All places along it are as good, those at the edge too: a bare wall's are, if the scan fits as ever.
         along = np.array([math.cos(direction), math.sin(direction), 0.0])
         off -= (off @ along) * along
-    return _at_edge(off, window)
-
-
-def _at_edge(off: Pose, window: SearchWindow) -> bool:
-    return bool((np.abs(off) > EDGE * window.half).any())
+    return at_edge(off, window)
 
 
 def _contradicts(result: MatchResult, expected: Expectation) -> bool:
     """Whether a match and the expectation cannot both be right."""
-    off = _difference(result.pose, expected.pose)
+    off = difference(result.pose, expected.pose)
     return result.converged and squared_mahalanobis(off, expected.covariance + result.covariance) > GATE
-
-
-def _difference(pose: Pose, other: Pose) -> Pose:
-    off: Pose = pose - other
-    off[2] = wrap(off[2])
-    return off

@@ -21,6 +21,9 @@ MOVING = 0.02
 LEAP = 0.2
 """Odometry leaps when its motion from one scan to the next differs by more than this from the one before (m + rad)."""
 
+FADING = 0.8
+"""Share of a motion that is left a scan later where neither odometry nor a match tells of it."""
+
 REST_STD_XY = 0.002
 REST_STD_THETA = math.radians(0.05)
 """Standard deviations of odometry that reports no motion (m, rad)."""
@@ -101,8 +104,10 @@ class MotionModel:
         step = np.array([scale * moved[0] + half * moved[1], scale * moved[1] - half * moved[0], moved[2]])
         return step / seconds
 
-    def observe(self, scan: LaserScan, motion: Pose) -> None:
-        """Take note of what the match of a scan said about the motion since the last."""
+    def observe(self, scan: LaserScan, motion: Pose, matched: bool) -> None:
+        """Take note of the motion from the last scan to this, and whether a match told it."""
+        if self.silent and self.still(scan) and not matched:
+            motion = FADING * motion
         if not self.still(scan):
             self._silent = 0
         elif math.hypot(motion[0], motion[1]) + abs(motion[2]) > MOVING:

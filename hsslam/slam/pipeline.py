@@ -19,6 +19,7 @@ from hsslam.slam.events import (
     SlamResult,
     Tracked,
 )
+from hsslam.slam.free_space import FreeSpace
 from hsslam.slam.graph import PoseGraph
 from hsslam.slam.journal import Replay
 from hsslam.slam.loops import LoopCloser
@@ -97,19 +98,20 @@ class Slam:
             self._graph = PoseGraph(self._config.graph, scan.odometry)
             self._tracker.start(scan, scan.robot_points)
             first = TrackedScan(np.zeros(3), np.eye(3) * 1e-12, 1.0, True, 0)
-            yield self._record(scan, 0, first)
-            yield self._keep(scan)
+            yield self._record(scan, 0, first, scan.robot_points)
+            yield self._keep(scan, scan.robot_points)
             return
         scan = self._tracker.deskewed(scan)
         tracked = self._tracker.track(scan, scan.robot_points, self._known(scan.index))
+        lasting = self._tracker.lasting(scan.robot_points)
         newest = len(self._graph) - 1
-        yield self._record(scan, newest, tracked)
+        yield self._record(scan, newest, tracked, lasting)
         if not self._tracker.wants_keyframe(tracked):
             return
-        self._tracker.add_keyframe(scan.robot_points, tracked)
+        self._tracker.add_keyframe(scan.robot_points, scan.laser_pose, tracked)
         self._graph.add_keyframe(tracked.relative, tracked.covariance)
         self._scans.becomes_keyframe(newest + 1)
-        yield self._keep(scan)
+        yield self._keep(scan, lasting)
         yield from self._close_loops()
 
     def finish(self) -> Iterator[Event]:
@@ -124,6 +126,8 @@ class Slam:
         yield from self._settle(self._verifier.close())
         self._closer.release()
         yield self._optimise("final")
+        with self._stopwatch.measure("final"):
+            self._forget_passers_by(graph.poses)
         for stage in range(self._config.graph.refine_rounds):
             with self._stopwatch.measure("final"):
                 rules = self._config.graph
@@ -139,6 +143,15 @@ class Slam:
         if self._config.graph.rescan_keyframes:
             with self._stopwatch.measure("rescan"):
                 self._rescan(graph)
+
+    def _forget_passers_by(self, poses: Poses) -> None:
+        """Leave out, of all points, those in what turned out to be free: who walks ahead hides it while driving."""
+        space = FreeSpace.seen_by(self._points, [scan.laser_pose for scan in self._keyframes], poses)
+        self._points = [space.outside(p, pose) for p, pose in zip(self._points, poses, strict=True)]
+        scans = self._scans
+        for i, pose in enumerate(compose_many(poses[scans.anchors], scans.relatives)):
+            lasting = space.outside(scans.points[i].astype(np.float64), pose)
+            scans.points[i] = lasting.astype(np.float32)
 
     def _rescan(self, graph: PoseGraph) -> None:
         """Match every scan against the finished map, and hang it on its keyframe anew."""
@@ -228,7 +241,7 @@ class Slam:
         t = self._replay.tracked.get(scan)
         return None if t is None else TrackedScan(t.relative, t.covariance, t.score, t.matched, t.evaluations)
 
-    def _record(self, scan: LaserScan, keyframe: int, tracked: TrackedScan) -> Tracked:
+    def _record(self, scan: LaserScan, keyframe: int, tracked: TrackedScan, lasting: Points) -> Tracked:
         pose = compose(self._require_graph().poses[keyframe], tracked.relative)
         self._scans.append(
             scan.stamp,
@@ -238,7 +251,7 @@ class Slam:
             tracked.relative,
             self._tracker.motion,
             self._tracker.noise,
-            scan.robot_points,
+            lasting,
         )
         self._matched += tracked.matched
         if self._tracker.guessed:
@@ -257,9 +270,9 @@ class Slam:
             evaluations=tracked.evaluations,
         )
 
-    def _keep(self, scan: LaserScan) -> KeyframeAdded:
+    def _keep(self, scan: LaserScan, lasting: Points) -> KeyframeAdded:
         self._keyframes.append(scan)
-        self._points.append(scan.robot_points)
+        self._points.append(lasting)
         newest = len(self._keyframes) - 1
         return KeyframeAdded(newest, scan.index, self._require_graph().poses[newest].copy())
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from hsslam.config import Config
 from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
-from hsslam.se2 import Points, Pose, Poses, between, compose, wrap
+from hsslam.se2 import Points, Pose, Poses, between, compose
 from hsslam.slam.factors import FLOOR_STD_THETA, FLOOR_STD_XY
 from hsslam.slam.fusion import rotated
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.submap import merge
-from hsslam.slam.windows import AGREEING, known_within
+from hsslam.slam.windows import AGREEING, at_edge, difference, known_within
 
 BLOCK = 4
 """Keyframes in a row whose scans are matched against the same submap."""
@@ -104,7 +104,8 @@ def match_scans(
             result = matcher.match(reference, points, guess, window, rng)
             if _apart(result.pose, guess, AWAY):
                 result = _unless_confirmed(matcher, reference, points, guess, window, result, rng)
-            matched[i] = result.converged and result.score >= rules.overlap_min_score
+            inside = not at_edge(difference(result.pose, guess), window)
+            matched[i] = result.converged and inside and result.score >= rules.overlap_min_score
             found[i] = compose(origin, result.pose) if matched[i] else expected
             covariances[i] = rotated(result.covariance, -origin[2])
     return found, covariances, matched
@@ -129,8 +130,8 @@ def _unless_confirmed(
 
 def _apart(pose: Pose, other: Pose, least: tuple[float, float]) -> bool:
     """Whether two poses differ by more than a distance (m) or an angle (rad)."""
-    x, y, theta = pose - other
-    return math.hypot(x, y) > least[0] or abs(wrap(theta)) > least[1]
+    x, y, theta = difference(pose, other)
+    return math.hypot(x, y) > least[0] or abs(theta) > least[1]
 
 
 def smooth(

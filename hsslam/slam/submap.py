@@ -9,6 +9,7 @@ import numpy as np
 
 from hsslam.matching.interface import Matcher, Reference
 from hsslam.se2 import Points, Pose, Poses, between, compose, transform
+from hsslam.slam.free_space import FreeSpace
 
 
 def merge(points: Sequence[Points], poses: Poses, origin: Pose) -> Points:
@@ -41,20 +42,27 @@ class GrowingSubmap:
     matcher : Matcher
         Prepares and extends the reference.
     points : Points
-        (N, 2) m, of the first keyframe.
+        (N, 2) m, of the first keyframe, in the order of the beams, in the robot's frame.
+    laser : Pose
+        Its laser, there.
     """
 
-    def __init__(self, matcher: Matcher[Any], points: Points) -> None:
+    def __init__(self, matcher: Matcher[Any], points: Points, laser: Pose) -> None:
         self._matcher = matcher
         self.reference: Reference = matcher.prepare(points)
         self.newest: Pose = np.zeros(3)
         """The newest keyframe, seen from the first."""
         self.size = 1
+        self.free_space = FreeSpace()
+        """Where its keyframes saw that there is nothing."""
+        self.free_space.add(points, laser, self.newest)
 
-    def add(self, points: Points, relative: Pose) -> None:
-        """Add a keyframe's (N, 2) points; ``relative`` is the keyframe seen from the newest one."""
+    def add(self, points: Points, laser: Pose, relative: Pose) -> None:
+        """Add a keyframe, seen from the newest one; of its (N, 2) points those are left out that are in free space."""
         self.newest = compose(self.newest, relative)
-        self.reference = self._matcher.extend(self.reference, transform(self.newest, points))
+        lasting = self.free_space.outside(points, self.newest)
+        self.reference = self._matcher.extend(self.reference, transform(self.newest, lasting))
+        self.free_space.add(points, laser, self.newest)
         self.size += 1
 
 
@@ -77,21 +85,21 @@ class LocalSubmap:
         self._size = size
         self._growing: list[GrowingSubmap] = []
 
-    def add(self, points: Points, relative: Pose) -> None:
-        """Add a keyframe's (N, 2) points; ``relative`` is the keyframe seen from the newest one, if there is one."""
+    def add(self, points: Points, laser: Pose, relative: Pose) -> None:
+        """Add a keyframe's (N, 2) points and its laser; ``relative``: the keyframe seen from the newest one, if any."""
         for submap in self._growing:
-            submap.add(points, relative)
+            submap.add(points, laser, relative)
         if not self._growing or self._growing[-1].size > self._size // 2:
-            self._growing.append(GrowingSubmap(self._matcher, points))
+            self._growing.append(GrowingSubmap(self._matcher, points, laser))
         if self._growing[0].size > self._size:
             del self._growing[0]
 
     @property
-    def reference(self) -> Reference:
+    def current(self) -> GrowingSubmap:
         """What to match against."""
-        return self._growing[0].reference
+        return self._growing[0]
 
     @property
     def newest(self) -> Pose:
-        """The newest keyframe in the frame of `reference`."""
-        return self._growing[0].newest
+        """The newest keyframe in the frame of the current submap."""
+        return self.current.newest

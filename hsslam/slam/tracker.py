@@ -60,6 +60,7 @@ class Tracker:
         self._pose: Pose = np.zeros(3)
         self._covariance: NDArray[np.float64] = np.zeros((3, 3))
         self._usual_score = 1.0
+        self._matched = False
         self.motion: Pose = np.zeros(3)
         """Motion predicted from the last scan but one to the last, in the frame of the former."""
         self.noise: NDArray[np.float64] = np.eye(3)
@@ -71,7 +72,7 @@ class Tracker:
     def start(self, scan: LaserScan, points: Points) -> None:
         """Begin with the first scan, the first keyframe."""
         self._motion.start(scan)
-        self._submap.add(points, np.zeros(3))
+        self._submap.add(points, scan.laser_pose, np.zeros(3))
 
     def deskewed(self, scan: LaserScan) -> LaserScan:
         """The next scan, with the velocity at which its beams went round; as it is where that is not to be undone."""
@@ -100,9 +101,14 @@ class Tracker:
         pose, posterior = compose(newest, tracked.relative), rotated(tracked.covariance, -newest[2])
         self._usual_score += FORGETTING * (tracked.score - self._usual_score)
         self.guessed = not tracked.matched and self._motion.still(scan)
-        self._motion.observe(scan, between(self._pose, pose))
+        self._motion.observe(scan, between(self._pose, pose), tracked.matched)
         self._pose, self._covariance = pose, posterior
+        self._matched = tracked.matched
         return tracked
+
+    def lasting(self, points: Points) -> Points:
+        """Of the last scan's (N, 2) points, in the robot's frame, those that are not in the middle of free space."""
+        return self._submap.current.free_space.outside(points, self._pose) if self._matched else points
 
     def wants_keyframe(self, tracked: TrackedScan) -> bool:
         """Whether the scan is far enough from the newest keyframe to become one, or sees what the submap lacks."""
@@ -112,10 +118,10 @@ class Tracker:
         far = math.hypot(x, y) >= share * rules.distance
         return far or abs(theta) >= share * math.radians(rules.angle_deg)
 
-    def add_keyframe(self, points: Points, tracked: TrackedScan) -> None:
-        """Make the last scan the newest keyframe."""
+    def add_keyframe(self, points: Points, laser: Pose, tracked: TrackedScan) -> None:
+        """Make the last scan the newest keyframe; its (N, 2) points and its laser are in the robot's frame."""
         with self._stopwatch.measure("submap"):
-            self._submap.add(points, tracked.relative)
+            self._submap.add(points, laser, tracked.relative)
         heading = self._pose[2]
         self._pose = self._submap.newest
         self._covariance = rotated(self._covariance, heading - self._pose[2])
@@ -134,7 +140,7 @@ class Tracker:
             score=self._usual_score,
         )
         rng = generator(self._config.seed, Purpose.TRACK, scan.index)
-        result = Locator(rules, self._matcher, self._submap.reference, points, rng, self._stopwatch).locate(
+        result = Locator(rules, self._matcher, self._submap.current, points, rng, self._stopwatch).locate(
             expected
         )
         matched = result.converged and result.score >= rules.min_score

@@ -11,7 +11,7 @@ import numpy as np
 from hsslam.config import WindowSection
 from hsslam.kernels.assess import assess
 from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
-from hsslam.se2 import Points, Pose
+from hsslam.se2 import Points, Pose, wrap
 from hsslam.slam.recovery import match_tiles
 
 SIGMAS = 3.0
@@ -19,6 +19,9 @@ SIGMAS = 3.0
 
 AGREEING = SearchWindow(0.04, 0.04, math.radians(2.0))
 """Window around a prediction in which an answer agrees with it, at least."""
+
+EDGE = 0.9
+"""An answer this far from the middle of the window, as a share of its half side, may be the edge of a better one."""
 
 
 def search_window(section: WindowSection) -> SearchWindow:
@@ -61,6 +64,18 @@ def known_within(
         reference.surface, points, result.pose, window.half, matcher.config.score_distance
     )
     return replace(result, covariance=covariance)
+
+
+def difference(pose: Pose, other: Pose) -> Pose:
+    """One pose less another, coordinate by coordinate, the angle wrapped."""
+    off: Pose = pose - other
+    off[2] = wrap(off[2])
+    return off
+
+
+def at_edge(off: Pose, window: SearchWindow) -> bool:
+    """Whether an answer that is ``off`` the middle of a window is at its edge."""
+    return bool((np.abs(off) > EDGE * window.half).any())
 
 
 def _between(value: float, least: float, most: float) -> float:

@@ -1,0 +1,78 @@
+"""Which of two answers is believed, told by a matcher that gives just these two."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hsslam.config import TrackerSection
+from hsslam.matching.interface import Estimate, Matcher, MatcherConfig, Reference, SearchWindow
+from hsslam.se2 import Points, Pose, pose, transform
+from hsslam.slam.locator import Expectation, Locator
+from hsslam.slam.stopwatch import Stopwatch
+from hsslam.slam.submap import GrowingSubmap
+
+STEADY = pose(0.1, 0.0, 0.0)
+POINTS = np.random.default_rng(3).uniform(-9.0, 9.0, (200, 2))
+
+
+class OneOfTwo(Matcher[MatcherConfig]):
+    """Answers with the nearer of two poses."""
+
+    covers_window = True
+    leapt: Pose
+
+    def estimate(
+        self,
+        reference: Reference,
+        points: Points,
+        guess: Pose,
+        window: SearchWindow,
+        rng: np.random.Generator,
+    ) -> Estimate:
+        return Estimate(
+            min(STEADY, self.leapt, key=lambda answer: float(np.abs(answer - guess).sum())).copy()
+        )
+
+
+def located(leapt: NDArray[np.float64], steady_points: int, leapt_points: int) -> Pose:
+    """Where a scan is, so many of whose 200 points are explained where it goes on and where odometry says it is."""
+    matcher = OneOfTwo()
+    matcher.leapt = leapt
+    known = np.concatenate(
+        (transform(STEADY, POINTS[:steady_points]), transform(leapt, POINTS[:leapt_points]))
+    )
+    locator = Locator(
+        TrackerSection(),
+        matcher,
+        GrowingSubmap(matcher, known, np.zeros(3)),
+        POINTS,
+        np.random.default_rng(0),
+        Stopwatch(),
+    )
+    expected = Expectation(
+        pose=leapt,
+        covariance=np.diag([0.2, 0.2, 0.1]) ** 2,
+        repeated=STEADY,
+        told=True,
+        leaps=True,
+        score=0.9,
+    )
+    return locator.locate(expected).pose
+
+
+@pytest.mark.parametrize(
+    ("leapt", "steady_points", "leapt_points", "goes_on"),
+    [
+        (pose(2.1, 0.0, 0.0), 180, 174, True),
+        (pose(2.1, 0.0, 0.0), 170, 180, False),
+        (pose(0.6, 0.0, 0.0), 180, 174, False),
+        (pose(0.6, 0.0, 0.0), 190, 160, True),
+    ],
+    ids=["impossible", "impossible but it fits better", "possible", "possible but it fits far less"],
+)
+def test_the_farther_odometry_leaps_the_less_it_takes_to_go_on(
+    leapt: NDArray[np.float64], steady_points: int, leapt_points: int, goes_on: bool
+) -> None:
+    assert located(leapt, steady_points, leapt_points) == pytest.approx(STEADY if goes_on else leapt)
