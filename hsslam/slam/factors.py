@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
 import gtsam
@@ -72,9 +73,13 @@ def pose2(pose: Pose) -> Any:
     return gtsam.Pose2(pose[0], pose[1], pose[2])
 
 
+@cache
+def _cauchy(scale: float) -> Any:
+    return gtsam.noiseModel.mEstimator.Cauchy.Create(scale)
+
+
 def _noise(edge: Edge, robust_scale: float | None) -> Any:
     noise: Any = gtsam.noiseModel.Gaussian.Covariance(body_covariance(edge))
     if robust_scale is not None and edge.kind != "odometry":
-        loss = gtsam.noiseModel.mEstimator.Cauchy.Create(robust_scale)
-        noise = gtsam.noiseModel.Robust.Create(loss, noise)
+        noise = gtsam.noiseModel.Robust.Create(_cauchy(robust_scale), noise)
     return noise

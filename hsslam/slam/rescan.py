@@ -160,6 +160,7 @@ def smooth(
 
     graph = gtsam.NonlinearFactorGraph()
     values = gtsam.Values()
+    loss = gtsam.noiseModel.mEstimator.Cauchy.Create(2.0)
     floor = np.diag([FLOOR_STD_XY**2, FLOOR_STD_XY**2, FLOOR_STD_THETA**2])
     for i, pose in enumerate(poses):
         here = gtsam.Pose2(*pose)
@@ -169,7 +170,7 @@ def smooth(
             graph.add(gtsam.PriorFactorPose2(i, here, noise))
         if i > 0:
             noise = gtsam.noiseModel.Gaussian.Covariance(noises[i])
-            robust = gtsam.noiseModel.Robust.Create(gtsam.noiseModel.mEstimator.Cauchy.Create(2.0), noise)
+            robust = gtsam.noiseModel.Robust.Create(loss, noise)
             graph.add(gtsam.BetweenFactorPose2(i - 1, i, gtsam.Pose2(*motions[i]), robust))
     solution = gtsam.LevenbergMarquardtOptimizer(graph, values).optimize()
     out: Poses = np.ascontiguousarray(gtsam.utilities.extractPose2(solution))
