@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
+from conftest import room_scan_at
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
@@ -147,3 +149,20 @@ def test_a_person_who_walks_along_does_not_draw_a_scan_away() -> None:
     )
     assert matched.all()
     np.testing.assert_allclose(found[1], relative, atol=0.01)
+
+
+@pytest.mark.parametrize(("off", "believed"), [(0.1, True), (0.145, False)])
+def test_what_is_found_at_the_edge_of_the_window_is_not_believed(off: float, believed: bool) -> None:
+    """A scan was hardly tracked that badly: what fits there fits better still beyond, or by chance."""
+    first, second = room_scan_at(np.zeros(3)).points, room_scan_at(pose(off, 0.0, 0.0)).points
+    found, _, matched = match_scans(
+        Config(),
+        create("hide"),
+        [first],
+        np.zeros((1, 3)),
+        [first.astype(np.float32), second.astype(np.float32)],
+        np.zeros(2, dtype=np.int64),
+        np.zeros((2, 3)),
+    )
+    assert matched.tolist() == [True, believed]
+    np.testing.assert_allclose(found[1], pose(off if believed else 0.0, 0.0, 0.0), atol=0.01)
