@@ -207,6 +207,11 @@ class GraphSection(Section):
         ge=0,
         description="keyframes every scan is matched against once more at the very end (0: not at all)",
     )
+    rescan_neighbours: int = Field(
+        default=1,
+        ge=0,
+        description="keyframes before and after it that every scan is matched against one by one, then",
+    )
     overlap_min_score: float = Field(
         default=0.35, ge=0.0, le=1.0, description="share of points such a match must explain"
     )

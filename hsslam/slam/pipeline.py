@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,8 +25,10 @@ from hsslam.slam.graph import PoseGraph
 from hsslam.slam.journal import Replay
 from hsslam.slam.loops import LoopCloser
 from hsslam.slam.overlap import match_pairs, moved, overlapping_pairs
-from hsslam.slam.rescan import match_scans, smooth
+from hsslam.slam.rescan import match_scans, worth_a_match
+from hsslam.slam.scan_pairs import match_with_keyframes
 from hsslam.slam.scan_table import ScanTable
+from hsslam.slam.smoothing import smooth
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.tracker import TrackedScan, Tracker
 from hsslam.slam.verification import LoopVerifier
@@ -154,18 +157,16 @@ class Slam:
             scans.points[i] = lasting.astype(np.float32)
 
     def _rescan(self, graph: PoseGraph) -> None:
-        """Match every scan against the finished map, and hang it on its keyframe anew."""
-        scans = self._scans
-        found, covariances, matched = match_scans(
-            self._config,
-            self._matcher,
-            self._points,
-            graph.poses,
-            scans.points,
-            scans.anchors,
-            scans.relatives,
-        )
-        poses = smooth(found, covariances, matched, scans.motions, scans.noises)
+        """Match every scan against the finished map and its neighbours, and hang it on its keyframe anew."""
+        scans, config, matcher = self._scans, self._config, self._matcher
+        known = (self._points, graph.poses, scans.points, scans.anchors, scans.relatives)
+        pairs = match_with_keyframes(config, matcher, *known)
+        wanted = worth_a_match(scans.anchors, pairs.partners(len(scans)))
+        found, covariances, matched = match_scans(config, matcher, *known, wanted)
+        # The smoother is what takes most memory of all: nothing is matched any more.
+        del known
+        scans.points, self._points = [], []
+        poses = smooth(found, covariances, matched, pairs, scans.motions, scans.noises)
         scans.relatives[:] = between_many(graph.poses[scans.anchors], poses)
 
     def result(self) -> SlamResult:
@@ -271,7 +272,7 @@ class Slam:
         )
 
     def _keep(self, scan: LaserScan, lasting: Points) -> KeyframeAdded:
-        self._keyframes.append(scan)
+        self._keyframes.append(replace(scan))  # a copy, without the points that a scan remembers once asked
         self._points.append(lasting)
         newest = len(self._keyframes) - 1
         return KeyframeAdded(newest, scan.index, self._require_graph().poses[newest].copy())

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 class Purpose(IntEnum):
@@ -15,9 +18,29 @@ class Purpose(IntEnum):
     OVERLAP = 2
     AMBIGUITY = 3
     SCAN = 4
+    PAIR = 5
 
 
 _WORD = 2**64
+
+
+class _Key(np.random.SeedSequence):
+    """What Philox takes for its key: given no more than that, it would first gather entropy, and that takes longer."""
+
+    def __init__(self, words: NDArray[np.uint64]) -> None:
+        self._words = words
+
+    def generate_state(self, n_words: int, dtype: Any = np.uint32) -> NDArray[Any]:
+        """The key itself."""
+        return self._words
+
+    def spawn(self, n_children: int) -> list[Any]:
+        """Seeds of generators that a matcher spawns from its own; they follow from the key."""
+        return self._family.spawn(n_children)
+
+    @cached_property
+    def _family(self) -> np.random.SeedSequence:
+        return np.random.SeedSequence(self._words.tolist())
 
 
 def generator(seed: int, purpose: Purpose, *numbers: int) -> np.random.Generator:
@@ -30,4 +53,4 @@ def generator(seed: int, purpose: Purpose, *numbers: int) -> np.random.Generator
     for number in numbers:
         packed = (packed << 24) + number
     key = np.array([(8 * seed + purpose) % _WORD, packed % _WORD], dtype=np.uint64)
-    return np.random.Generator(np.random.Philox(key=key))
+    return np.random.Generator(np.random.Philox(_Key(key)))
