@@ -76,3 +76,42 @@ def test_the_farther_odometry_leaps_the_less_it_takes_to_go_on(
     leapt: NDArray[np.float64], steady_points: int, leapt_points: int, goes_on: bool
 ) -> None:
     assert located(leapt, steady_points, leapt_points) == pytest.approx(STEADY if goes_on else leapt)
+
+
+class RestlessHere(OneOfTwo):
+    """Answers with the nearer of two poses, and says of one of them that it did not come to rest there."""
+
+    def estimate(
+        self,
+        reference: Reference,
+        points: Points,
+        guess: Pose,
+        window: SearchWindow,
+        rng: np.random.Generator,
+    ) -> Estimate:
+        found = super().estimate(reference, points, guess, window, rng)
+        if window.half_x > 0.5:  # the wide search finds something else
+            return Estimate(self.leapt.copy())
+        return Estimate(found.pose, converged=bool((found.pose != STEADY).any()))
+
+
+@pytest.mark.parametrize(("elsewhere_points", "stays"), [(110, True), (196, False)])
+def test_what_did_not_come_to_rest_gives_way_only_to_what_fits_better(
+    elsewhere_points: int, stays: bool
+) -> None:
+    matcher = RestlessHere()
+    matcher.leapt = elsewhere = pose(0.7, 0.1, 0.2)
+    known = np.concatenate((transform(STEADY, POINTS[:190]), transform(elsewhere, POINTS[:elsewhere_points])))
+    submap = GrowingSubmap(matcher, known, np.zeros(3))
+    locator = Locator(TrackerSection(), matcher, submap, POINTS, np.random.default_rng(0), Stopwatch())
+    expected = Expectation(
+        pose=STEADY,
+        covariance=np.diag([0.01, 0.01, 0.02]) ** 2,
+        repeated=STEADY,
+        told=True,
+        leaps=False,
+        score=0.95,
+    )
+    found = locator.locate(expected)
+    assert found.pose == pytest.approx(STEADY if stays else elsewhere)
+    assert found.converged is not stays

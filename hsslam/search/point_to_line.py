@@ -13,6 +13,9 @@ from hsslam.se2 import Points, Pose
 RESOLUTION = 0.1
 """Side of a cell of the far raster (m); the last stage uses the surface's own, which is finer."""
 
+SWING = 0.005
+"""A pose that goes to and fro by less than this (m, rad) at the end has arrived."""
+
 
 class PointToLineReference(Reference):
     """A reference whose nearest segment is known from afar.
@@ -63,7 +66,7 @@ def point_to_line_icp(
     Returns
     -------
     (Pose, int, bool)
-        The pose, iterations spent, and whether the last stage came to rest.
+        The pose, iterations spent, and whether the last stage came to rest, or to and fro within `SWING`.
     """
     surface = reference.surface
     coarse, first, _ = refine(
@@ -90,4 +93,20 @@ def point_to_line_icp(
         (distances[1], distances[2]),
         (scales[1], scales[1]),
     )
+    if not converged:
+        # Points that change from one line to the next and back keep the pose swinging, often by less than a millimetre.
+        last, third, _ = refine(
+            surface.pieces,
+            surface.nearest,
+            surface.frame,
+            points,
+            NO_LINES,
+            fine,
+            2,
+            1.0,
+            (distances[2], distances[2]),
+            (scales[1], scales[1]),
+        )
+        second += third
+        converged = third > 0 and bool((np.abs(last - fine) < SWING).all())
     return fine, first + second, converged

@@ -182,8 +182,7 @@ class Locator:
     def _look_further(self, expected: Expectation, first: MatchResult) -> MatchResult:
         """Search the widest window around the prediction: what a narrow one found at its edge was cut off by it."""
         wide = self._match(expected.pose, self._widest)
-        better = wide.converged and (not first.converged or wide.score > first.score + EDGE_GAIN)
-        return self._settled(wide if better else first)
+        return self._settled(wide if _better(wide, first, EDGE_GAIN) else first)
 
     def _agree(self, expected: Expectation, first: MatchResult) -> MatchResult:
         """Search only where odometry may be right: what fits about as well there is likelier than what denies it."""
@@ -205,8 +204,7 @@ class Locator:
         best = self._match(expected.repeated, self._window)
         if self._doubtful(best):
             best = self._match(expected.repeated, self._widest)
-        gain = expected.least_gain(best.pose)
-        if best.converged and (not first.converged or best.score > first.score + gain):
+        if _better(best, first, expected.least_gain(best.pose)):
             return self._settled(best)
         return first
 
@@ -221,6 +219,14 @@ class Locator:
             if not at_edge(moved, self._window):
                 break
         return found
+
+
+def _better(other: MatchResult, first: MatchResult, gain: float) -> bool:
+    """Whether another answer is to replace the first: for a score that is higher, by ``gain`` if the first converged.
+
+    A method that did not come to rest may stand right where the scan belongs: what fits less well is no better.
+    """
+    return other.converged and other.score > first.score + (gain if first.converged else 0.0)
 
 
 def _cut_off(result: MatchResult, expected: Expectation, window: SearchWindow) -> bool:
