@@ -127,11 +127,13 @@ class Locator:
         self._window = search_window(rules.window)
         self._widest = search_window(rules.recovery_window)
         self._evaluations = 0
+        self._enough = 1.0
 
     def locate(self, expected: Expectation) -> MatchResult:
         """The best answer, whose ``evaluations`` are those of all matches that it took."""
         # A robot that turns far between two scans may have turned farther than the usual window reaches.
         window = expected.window(self._window, self._widest)
+        self._enough = max(expected.score - USUAL, self._rules.recovery_score)
         with self._stopwatch.measure("track"):
             found = self._match(expected.pose, window)
             cut_off = _cut_off(found, expected, window)
@@ -159,6 +161,10 @@ class Locator:
             self._matcher, self._reference, self._points, guess, window, self._window, self._rng
         )
         self._evaluations += result.evaluations
+        if not result.converged and "rejected" not in result.diagnostics and result.score >= self._enough:
+            # The method did not come to rest, but where it stands the scan fits as ever; how far that may be from
+            # the bottom is part of the covariance.
+            return replace(result, converged=True)
         return result
 
     def _known_within(self, window: SearchWindow, result: MatchResult) -> MatchResult:

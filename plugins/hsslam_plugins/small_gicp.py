@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from hsslam.matching import (
@@ -17,6 +18,7 @@ from hsslam.matching import (
     SearchWindow,
     clean,
 )
+from hsslam.search.point_to_line import SWING
 from hsslam_plugins.local import LocalConfig, planar_pose, transformation
 
 INSTALL = "pip install 'hsslam[small-gicp]'"
@@ -91,28 +93,35 @@ class SmallGicp(Matcher[SmallGicpConfig]):
         assert isinstance(reference, SmallGicpReference)
         config, align = self.config, package().align
         scan, _ = layered_cloud(points, config)
-        matrix, iterations, converged = transformation(guess), 0, False
-        for distance in (config.distance_start, config.distance_end):
+
+        def run(start: NDArray[np.float64], distance: float, most: int) -> Any:
             # One thread: sums taken in parallel would differ in their last digits from call to call.
-            result = align(
+            return align(
                 reference.cloud,
                 scan,
                 reference.tree,
-                init_T_target_source=matrix,
+                init_T_target_source=start,
                 registration_type="GICP",
                 max_correspondence_distance=distance,
                 num_threads=1,
-                max_iterations=config.max_iterations,
+                max_iterations=most,
                 rotation_epsilon=config.rotation_tolerance,
                 translation_epsilon=config.translation_tolerance,
             )
-            matrix = result.T_target_source
-            iterations += int(result.iterations)
-            # Three copies of three points: what fixes a pose in the plane.
-            converged = bool(result.converged) and int(result.num_inliers) >= 9
+
+        coarse = run(transformation(guess), config.distance_start, config.max_iterations)
+        fine = run(coarse.T_target_source, config.distance_end, config.max_iterations)
+        pose, iterations = planar_pose(fine.T_target_source), int(coarse.iterations) + int(fine.iterations)
+        converged = bool(fine.converged)
+        if not converged:
+            # Points that change partners to and fro keep the pose swinging, mostly by millimetres.
+            last = run(fine.T_target_source, config.distance_end, 2)
+            iterations += int(last.iterations)
+            converged = bool((np.abs(planar_pose(last.T_target_source) - pose) < SWING).all())
         return Estimate(
-            window.keep(guess, planar_pose(matrix), config.window_slack),
-            converged=converged,
+            window.keep(guess, pose, config.window_slack),
+            # Three copies of three points: what fixes a pose in the plane.
+            converged=converged and int(fine.num_inliers) >= 9,
             evaluations=iterations,
         )
 
