@@ -67,3 +67,22 @@ def test_tiles_find_what_one_of_them_cannot() -> None:
     result = match_tiles(matcher, reference, points, np.zeros(3), WIDE, TILE, np.random.default_rng(1))
     assert result.converged
     assert result.pose == pytest.approx(truth, abs=0.03)
+
+
+def test_tiles_end_with_the_nearest_answer_that_fits_as_it_should() -> None:
+    matcher, points = create("pl_icp"), niches(9, 0.8)
+    reference = matcher.prepare(points)
+
+    def found(enough: float) -> tuple[float, int]:
+        result = match_tiles(
+            matcher, reference, points, pose(0.3, 0.0, 0.0), WIDE, TILE, np.random.default_rng(1), enough
+        )
+        assert result.converged
+        return result.pose[0], result.evaluations
+
+    everywhere, most = found(math.inf)
+    nearest, spent = found(0.9)
+    assert everywhere == pytest.approx(0.0, abs=0.02)
+    assert nearest == pytest.approx(0.0, abs=0.02)
+    assert spent < 0.5 * most
+    assert found(1.1) == (everywhere, most)

@@ -158,7 +158,14 @@ class Locator:
 
     def _match(self, guess: Pose, window: SearchWindow) -> MatchResult:
         result = match_within(
-            self._matcher, self._reference, self._points, guess, window, self._window, self._rng
+            self._matcher,
+            self._reference,
+            self._points,
+            guess,
+            window,
+            self._window,
+            self._rng,
+            self._enough,
         )
         self._evaluations += result.evaluations
         if not result.converged and "rejected" not in result.diagnostics and result.score >= self._enough:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -24,6 +25,7 @@ def match_tiles(
     wide: SearchWindow,
     tile: SearchWindow,
     rng: np.random.Generator,
+    enough: float = math.inf,
 ) -> MatchResult:
     """Match from the middle of every tile of a wide window and take the answer of highest score.
 
@@ -37,7 +39,9 @@ def match_tiles(
     centre : Pose
         Of the wide window.
     wide, tile : SearchWindow
-        The whole, and the part searched at a time.
+        The whole, and the part searched at a time: those nearest to the middle first.
+    enough : float
+        A converged answer of this score ends the search.
 
     Returns
     -------
@@ -47,11 +51,14 @@ def match_tiles(
     best: MatchResult | None = None
     evaluations = 0
     steps = (steps_along(w, t) for w, t in zip(wide.half, tile.half, strict=True))
-    for offset in product(*steps):
-        result = matcher.match(reference, points, centre + np.array(offset), tile, rng)
+    offsets = np.array(list(product(*steps)))
+    for offset in offsets[np.argsort(np.square(offsets / tile.half).sum(axis=1), kind="stable")]:
+        result = matcher.match(reference, points, centre + offset, tile, rng)
         evaluations += result.evaluations
         if best is None or (result.converged, result.score) > (best.converged, best.score):
             best = result
+            if best.converged and best.score >= enough:
+                break
     assert best is not None
     return replace(best, evaluations=evaluations)
 

@@ -49,11 +49,15 @@ def match_within(
     window: SearchWindow,
     tile: SearchWindow,
     rng: np.random.Generator,
+    enough: float = math.inf,
 ) -> MatchResult:
-    """Match over a window, tile by tile where it is larger than a tile and more than the matcher can look through."""
+    """Match over a window, tile by tile where it is larger than a tile and more than the matcher can look through.
+
+    The tiles end with one whose answer has a score of ``enough``.
+    """
     if matcher.covers_window or bool((window.half <= tile.half).all()):
         return matcher.match(reference, points, guess, window, rng)
-    return match_tiles(matcher, reference, points, guess, window, tile, rng)
+    return match_tiles(matcher, reference, points, guess, window, tile, rng, enough)
 
 
 def known_within(
