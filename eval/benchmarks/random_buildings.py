@@ -195,8 +195,16 @@ def _tour(
 def _ring(rng: np.random.Generator) -> FloorPlan:
     """A round of corridor, perhaps with a way across; niches and open rooms here and there."""
     width, height = rng.uniform(12.0, 70.0), rng.uniform(10.0, 40.0)
-    wide = rng.uniform(1.6, 3.2)
-    every = rng.uniform(2.0, 9.0)
+    wide, every = rng.uniform(1.6, 3.2), rng.uniform(2.0, 9.0)
+    solids, route = corridor_ring(rng, width, height, wide, every)
+    solids += _furniture(rng, route, (width, height), int(rng.integers(0, 25)), least=0.75)
+    return FloorPlan("ring", "", tuple(solids), route)
+
+
+def corridor_ring(
+    rng: np.random.Generator, width: float, height: float, wide: float, every: float
+) -> tuple[list[Points], Points]:
+    """Walls of a round of corridor, ``wide`` (m), with closed doors ``every`` few metres, and the route along it."""
 
     def doors(low: float, high: float) -> list[tuple[float, float, str]]:
         middles = np.arange(low + 1.2, high - 1.2, every)
@@ -214,9 +222,7 @@ def _ring(rng: np.random.Generator) -> FloorPlan:
         ):
             solids += wall(axis, float(level), float(low), float(high), doors(low, high))  # type: ignore[arg-type]
     m = 0.5 * wide
-    route = np.array([(m, m), (width - m, m), (width - m, height - m), (m, height - m)])
-    solids += _furniture(rng, route, (width, height), int(rng.integers(0, 25)), least=0.75)
-    return FloorPlan("ring", "", tuple(solids), route)
+    return solids, np.array([(m, m), (width - m, m), (width - m, height - m), (m, height - m)])
 
 
 def _hall(rng: np.random.Generator) -> FloorPlan:
