@@ -48,7 +48,8 @@ def test_a_scan_beyond_the_usual_window_is_found(
     truth: NDArray[np.float64], odometry: NDArray[np.float64], matcher: str
 ) -> None:
     found = tracked(truth, odometry, matcher)
-    assert found.relative == pytest.approx(truth, abs=0.04)
+    # GLASM counts points in squares of 10.5 cm and refines nothing.
+    assert found.relative == pytest.approx(truth, abs=0.05 if matcher == "glasm" else 0.04)
 
 
 @pytest.mark.parametrize(

@@ -185,6 +185,8 @@ class Locator:
     ) -> MatchResult:
         """Match again without the returns that are in free space, whether the expectation is right or the match."""
         in_free_space = self._free_space.holds(self._points, expected.pose)
+        if not in_free_space.any():
+            return first
         in_free_space &= self._free_space.holds(self._points, first.pose)
         count = np.count_nonzero(in_free_space)
         if count == 0 or len(self._points) - count < MINIMUM_POINTS:

@@ -69,7 +69,8 @@ class MotionModel:
 
     def still(self, scan: LaserScan) -> bool:
         """Whether odometry says the same of a scan as of the last."""
-        return bool((scan.odometry == self._odometry).all())
+        same: bool = scan.odometry.tolist() == self._odometry.tolist()
+        return same
 
     def leaps(self, scan: LaserScan) -> bool:
         """Whether odometry's motion to a scan is unlike the one before: wheels slip, messages come late."""

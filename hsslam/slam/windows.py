@@ -55,7 +55,10 @@ def match_within(
 
     The tiles end with one whose answer has a score of ``enough``.
     """
-    if matcher.covers_window or bool((window.half <= tile.half).all()):
+    fits = (
+        window.half_x <= tile.half_x and window.half_y <= tile.half_y and window.half_theta <= tile.half_theta
+    )
+    if matcher.covers_window or fits:
         return matcher.match(reference, points, guess, window, rng)
     return match_tiles(matcher, reference, points, guess, window, tile, rng, enough)
 
@@ -79,7 +82,12 @@ def difference(pose: Pose, other: Pose) -> Pose:
 
 def at_edge(off: Pose, window: SearchWindow) -> bool:
     """Whether an answer that is ``off`` the middle of a window is at its edge."""
-    return bool((np.abs(off) > EDGE * window.half).any())
+    x, y, theta = map(float, off)
+    return (
+        abs(x) > EDGE * window.half_x
+        or abs(y) > EDGE * window.half_y
+        or abs(theta) > EDGE * window.half_theta
+    )
 
 
 def _between(value: float, least: float, most: float) -> float:
