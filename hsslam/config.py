@@ -141,7 +141,7 @@ class LoopSection(Section):
     every: int = Field(default=1, ge=1, description="look for a loop at every n-th keyframe")
     candidates: int = Field(default=2, ge=1, description="candidates tried per keyframe, nearest first")
     window: WindowSection = WindowSection(half_x=1.0, half_y=1.0, half_theta_deg=20.0)
-    far_window: WindowSection = WindowSection(half_x=16.0, half_y=16.0, half_theta_deg=40.0)
+    far_window: WindowSection = WindowSection(half_x=8.0, half_y=8.0, half_theta_deg=40.0)
     min_score: float = Field(default=0.6, ge=0.0, le=1.0, description="share of points a loop must explain")
     max_std: float = Field(
         default=0.2, gt=0.0, description="largest standard deviation of an accepted loop (m)"

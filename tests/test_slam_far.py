@@ -84,3 +84,22 @@ def test_a_loop_is_found_after_a_drift_of_metres(name: str, round_trip: tuple[Po
     assert loop.reason == ""
     assert loop.relative == pytest.approx(between(truth[5], truth[-1]), abs=0.03)
     assert closer.ambiguity(loop, points, estimate) > 0.9  # a corridor explains itself a few steps on, too
+
+
+@pytest.mark.parametrize(
+    ("half", "std", "found"),
+    [(2.0, 2.0, True), (2.0, 0.6, False)],
+    ids=["the graph is that unsure", "the graph is surer"],
+)
+def test_a_place_beyond_the_far_window_is_found_where_the_graph_is_unsure_of_more(
+    half: float, std: float, found: bool, round_trip: tuple[Poses, list[Points]]
+) -> None:
+    truth, points = round_trip
+    estimate = truth.copy()
+    estimate[-1] = compose(DRIFT, truth[-1])
+    window = [f"loops.far_window.half_x={half}", f"loops.far_window.half_y={half}"]
+    closer = LoopCloser(load_config(overrides=window), create("hide"), Stopwatch())
+    candidate = Candidate(first=5, variance_xy=std**2, variance_theta=math.radians(5.0) ** 2)
+    loop = closer.match(candidate, points, estimate)
+    off = between(between(truth[5], truth[-1]), loop.relative)
+    assert (math.hypot(off[0], off[1]) < 0.03) is found

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import Config
-from hsslam.matching.interface import Matcher, Reference, SearchWindow
+from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
 from hsslam.se2 import Points, Pose, Poses, between, compose, inverse, wrap
 from hsslam.slam.events import LoopChecked
 from hsslam.slam.far import NEAR, FarSearch
@@ -32,6 +32,9 @@ NEAREST = 200
 
 LEAST = SearchWindow(0.15, 0.15, math.radians(5.0))
 """No window is smaller than this: it costs a search little, and covariances may be too small."""
+
+BEYOND_GAIN = 0.05
+"""What is found beyond the far window, in one twice as wide, must score this much more than what is in it."""
 
 ELSEWHERE = SearchWindow(0.5, 0.5, math.radians(15.0))
 """An answer outside of this around the one in question is another one."""
@@ -83,7 +86,8 @@ class LoopCloser:
         self._matcher = matcher
         self._stopwatch = stopwatch
         self._widest = search_window(config.loops.window)
-        self._farthest = search_window(config.loops.far_window)
+        self._farthest = far = search_window(config.loops.far_window)
+        self._beyond = SearchWindow(2.0 * far.half_x, 2.0 * far.half_y, far.half_theta)
         self._tile = search_window(config.tracker.window)
         self._places: dict[int, _Place] = {}
 
@@ -185,9 +189,19 @@ class LoopCloser:
         rng = generator(self._config.seed, Purpose.LOOP, first, second)
         expected = compose(base, guess)
         window = foreseen_window(candidate.variance_xy, candidate.variance_theta, LEAST, self._farthest)
+
+        def matched(expected: Pose, window: SearchWindow) -> MatchResult:
+            return match_within(self._matcher, place.reference, scan, expected, window, self._tile, rng)
+
         if (window.half > self._widest.half).any():
-            expected, window = place.far.best(scan, expected, window), NEAR
-        result = match_within(self._matcher, place.reference, scan, expected, window, self._tile, rng)
+            result = matched(place.far.best(scan, expected, window), NEAR)
+            beyond = foreseen_window(candidate.variance_xy, candidate.variance_theta, window, self._beyond)
+            if beyond != window:
+                # The truth may be further out; but the more of a long corridor is in a window, the more looks alike.
+                other = matched(place.far.best(scan, expected, beyond), NEAR)
+                result = other if other.converged and other.score > result.score + BEYOND_GAIN else result
+        else:
+            result = matched(expected, window)
         return LoopChecked(
             first=first,
             second=second,
