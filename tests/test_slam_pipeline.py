@@ -254,3 +254,34 @@ def test_rounds_of_refinement_end_when_nothing_moves(office: SimulatedDataset) -
     stages = [event.stage for event in events if isinstance(event, Optimised)]
     assert stages[:2] == ["final", "refinement 1"]
     assert len(stages) < 12
+
+
+def test_a_finished_run_goes_on_and_is_finished_again(office: SimulatedDataset) -> None:
+    slam = Slam()
+    scans = [scan for scan in office.scans() if scan.index < 80]
+    for scan in scans[:40]:
+        slam.process(scan)
+    assert len(list(slam.finish())) > 0
+    assert len(slam.result().trajectory.poses) == 40
+    for scan in scans[40:]:
+        slam.process(scan)
+    assert len(list(slam.finish())) > 0
+    found = slam.result().trajectory.poses
+    assert len(found) == 80
+    error = between_many(office.poses[:80], found)
+    assert np.hypot(error[:, 0], error[:, 1]).max() < 0.05
+
+
+def test_after_the_last_scan_none_may_follow(office: SimulatedDataset) -> None:
+    scans = [scan for scan in office.scans() if scan.index < 31]
+    ended, open_end = Slam(), Slam()
+    for slam in (ended, open_end):
+        for scan in scans[:30]:
+            slam.process(scan)
+    list(ended.finish(last=True))
+    list(open_end.finish())
+    assert (ended.result().trajectory.poses == open_end.result().trajectory.poses).all()
+    with pytest.raises(DataError, match="finished for the last time"):
+        ended.process(scans[30])
+    with pytest.raises(DataError, match="finished for the last time"):
+        list(ended.finish())

@@ -89,7 +89,6 @@ class Unfinished:
         self.poses: Poses = before.keyframe_poses
         self._edges = list(before.edges)
         self._relatives = self._slam._scans.relatives.copy()
-        self._points = list(self._slam._points), list(self._slam._scans.points)
 
     @property
     def true_loops(self) -> int:
@@ -104,7 +103,6 @@ class Unfinished:
         slam, graph = self._slam, self._slam._require_graph()
         slam._config, graph._config = config, config.graph
         slam._scans.relatives[:] = self._relatives
-        slam._points, slam._scans.points = (list(points) for points in self._points)
         graph.edges = list(self._edges)
         graph.poses[:] = self.poses
         for edge in false:

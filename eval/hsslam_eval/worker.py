@@ -109,7 +109,7 @@ def run_slam_job(job: Job, place: Path, reporter: Reporter) -> SlamOutcome:
                 journal.write(event)
             reporter.progress("slam", done, max(total, done) if total else 0)
         reporter.progress("optimise", 0, 0)
-        for done, event in enumerate(slam.finish(), start=1):
+        for done, event in enumerate(slam.finish(last=True), start=1):
             journal.write(event)
             reporter.progress("optimise", done, 0)
         result = slam.result()

@@ -51,7 +51,7 @@ def run_log(
                 shown.update(done, f"{loops} loops")
             tracked, live_online = time.perf_counter(), live.seconds
             shown.stage("optimising the graph")
-            for event in slam.finish():
+            for event in slam.finish(last=True):
                 journal.write(event)
                 live.update([event])
             result = slam.result()

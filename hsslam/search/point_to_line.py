@@ -94,7 +94,7 @@ def point_to_line_icp(
         (scales[1], scales[1]),
     )
     if not converged:
-        # Points that change from one line to the next and back keep the pose swinging, often by less than a millimetre.
+        # Points that change from one line to the next and back keep the pose swinging, mostly by millimetres.
         last, third, _ = refine(
             surface.pieces,
             surface.nearest,

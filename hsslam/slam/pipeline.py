@@ -73,6 +73,7 @@ class Slam:
         self._evaluations = 0
         self._guessed = 0
         self._first_guessed: int | None = None
+        self._ended = False
 
     def run(self, scans: Iterable[LaserScan]) -> Iterator[Event]:
         """Process every scan of a log, then finish."""
@@ -93,7 +94,13 @@ class Slam:
         -------
         list of Event
             First a `Tracked` with the scan's pose, then what followed from it.
+
+        Raises
+        ------
+        DataError
+            If the run was finished for the last time.
         """
+        self._require_open()
         return list(self._process(scan))
 
     def _process(self, scan: LaserScan) -> Iterator[Event]:
@@ -117,14 +124,24 @@ class Slam:
         yield self._keep(scan, lasting)
         yield from self._close_loops()
 
-    def finish(self) -> Iterator[Event]:
-        """Optimise everything once more, and match keyframes that overlap again from there.
+    def finish(self, last: bool = False) -> Iterator[Event]:
+        """Optimise everything once more, match keyframes that overlap again from there, then every scan.
+
+        Parameters
+        ----------
+        last : bool
+            That no scan will follow: submaps and points are let go where they have served, which saves memory.
+            Else the run may go on, and be finished again.
 
         Raises
         ------
         DataError
-            If there was no scan.
+            If there was no scan, or the run was finished for the last time before.
         """
+        self._require_open()
+        self._ended = last
+        if last:
+            del self._tracker  # its submaps are of use to the next scan only
         graph = self._require_graph()
         yield from self._settle(self._verifier.close())
         self._closer.release()
@@ -145,7 +162,7 @@ class Slam:
                 break
         if self._config.graph.rescan_keyframes:
             with self._stopwatch.measure("rescan"):
-                self._rescan(graph)
+                self._rescan(graph, last)
 
     def _forget_passers_by(self, poses: Poses) -> None:
         """Leave out, of all points, those in what turned out to be free: who walks ahead hides it while driving."""
@@ -156,16 +173,17 @@ class Slam:
             lasting = space.outside(scans.points[i].astype(np.float64), pose)
             scans.points[i] = lasting.astype(np.float32)
 
-    def _rescan(self, graph: PoseGraph) -> None:
+    def _rescan(self, graph: PoseGraph, last: bool) -> None:
         """Match every scan against the finished map and its neighbours, and hang it on its keyframe anew."""
         scans, config, matcher = self._scans, self._config, self._matcher
         known = (self._points, graph.poses, scans.points, scans.anchors, scans.relatives)
         pairs = match_with_keyframes(config, matcher, *known)
         wanted = worth_a_match(scans.anchors, pairs.partners(len(scans)))
         found, covariances, matched = match_scans(config, matcher, *known, wanted)
-        # The smoother is what takes most memory of all: nothing is matched any more.
-        del known
-        scans.points, self._points = [], []
+        if last:
+            # The smoother is what takes most memory of all.
+            del known
+            scans.points, self._points = [], []
         poses = smooth(found, covariances, matched, pairs, scans.motions, scans.noises)
         scans.relatives[:] = between_many(graph.poses[scans.anchors], poses)
 
@@ -276,6 +294,10 @@ class Slam:
         self._points.append(lasting)
         newest = len(self._keyframes) - 1
         return KeyframeAdded(newest, scan.index, self._require_graph().poses[newest].copy())
+
+    def _require_open(self) -> None:
+        if self._ended:
+            raise DataError("the run was finished for the last time: begin another one")
 
     def _require_graph(self) -> PoseGraph:
         if self._graph is None:
