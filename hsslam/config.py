@@ -210,7 +210,7 @@ class GraphSection(Section):
     rescan_neighbours: int = Field(
         default=1,
         ge=0,
-        description="keyframes before and after it that every scan is matched against one by one, then",
+        description="then, keyframes before it, and as many after it, that every scan is matched against one by one",
     )
     overlap_min_score: float = Field(
         default=0.35, ge=0.0, le=1.0, description="share of points such a match must explain"

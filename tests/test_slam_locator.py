@@ -36,20 +36,18 @@ class OneOfTwo(Matcher[MatcherConfig]):
         )
 
 
+def locator_in(known: Points, matcher: OneOfTwo) -> Locator:
+    """Of a scan of 200 points in a submap."""
+    submap = GrowingSubmap(matcher, known, np.zeros(3))
+    return Locator(TrackerSection(), matcher, submap, POINTS, np.random.default_rng(0), Stopwatch())
+
+
 def located(leapt: NDArray[np.float64], steady_points: int, leapt_points: int) -> Pose:
     """Where a scan is, so many of whose 200 points are explained where it goes on and where odometry says it is."""
     matcher = OneOfTwo()
     matcher.leapt = leapt
     known = np.concatenate(
         (transform(STEADY, POINTS[:steady_points]), transform(leapt, POINTS[:leapt_points]))
-    )
-    locator = Locator(
-        TrackerSection(),
-        matcher,
-        GrowingSubmap(matcher, known, np.zeros(3)),
-        POINTS,
-        np.random.default_rng(0),
-        Stopwatch(),
     )
     expected = Expectation(
         pose=leapt,
@@ -59,7 +57,7 @@ def located(leapt: NDArray[np.float64], steady_points: int, leapt_points: int) -
         leaps=True,
         score=0.9,
     )
-    return locator.locate(expected).pose
+    return locator_in(known, matcher).locate(expected).pose
 
 
 @pytest.mark.parametrize(
@@ -108,8 +106,6 @@ def test_what_did_not_come_to_rest_gives_way_only_to_what_fits_better(
     known = np.concatenate(
         (transform(STEADY, POINTS[:here_points]), transform(elsewhere, POINTS[:elsewhere_points]))
     )
-    submap = GrowingSubmap(matcher, known, np.zeros(3))
-    locator = Locator(TrackerSection(), matcher, submap, POINTS, np.random.default_rng(0), Stopwatch())
     expected = Expectation(
         pose=STEADY,
         covariance=np.diag([0.01, 0.01, 0.02]) ** 2,
@@ -118,6 +114,6 @@ def test_what_did_not_come_to_rest_gives_way_only_to_what_fits_better(
         leaps=False,
         score=0.95,
     )
-    found = locator.locate(expected)
+    found = locator_in(known, matcher).locate(expected)
     assert found.pose == pytest.approx(STEADY if stays else elsewhere)
     assert found.converged is believed

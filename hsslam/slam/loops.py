@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -199,7 +199,9 @@ class LoopCloser:
             if beyond != window:
                 # The truth may be further out; but the more of a long corridor is in a window, the more looks alike.
                 other = matched(place.far.best(scan, expected, beyond), NEAR)
-                result = other if other.converged and other.score > result.score + BEYOND_GAIN else result
+                better = other.converged and other.score > result.score + BEYOND_GAIN
+                spent = result.evaluations + other.evaluations
+                result = replace(other if better else result, evaluations=spent)
         else:
             result = matched(expected, window)
         return LoopChecked(

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from hsslam.config import Config
 from hsslam.jit import kernel
-from hsslam.matching.interface import Matcher, Reference, SearchWindow
+from hsslam.matching.interface import Matcher, Reference
 from hsslam.se2 import Points, Poses, between, between_many, wrap
 from hsslam.slam.events import Edge
 from hsslam.slam.randomness import Purpose, generator
+from hsslam.slam.windows import overlap_window
 
 SPREAD = 2
 """Keyframes between two that are matched with the same third, at least: neighbours in time tell the same."""
@@ -82,9 +83,7 @@ def match_pairs(
 ) -> list[Edge]:
     """Match each pair from its current relative pose; constraints that were found are returned."""
     rules = config.graph
-    window = SearchWindow(
-        rules.overlap_half_xy, rules.overlap_half_xy, math.radians(rules.overlap_half_theta_deg)
-    )
+    window = overlap_window(rules)
     edges: list[Edge] = []
     reference: Reference | None = None
     prepared = -1

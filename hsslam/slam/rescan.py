@@ -18,7 +18,7 @@ from hsslam.se2 import Points, Pose, Poses, between, compose, compose_many
 from hsslam.slam.fusion import rotated
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.submap import merge
-from hsslam.slam.windows import AGREEING, at_edge, difference, known_within
+from hsslam.slam.windows import AGREEING, at_edge, difference, known_within, overlap_window
 
 BLOCK = 4
 """Keyframes in a row whose scans are matched against the same submap."""
@@ -105,9 +105,7 @@ def match_scans(
         Poses in the map, their covariances in the axes of the map, and which of them were matched.
     """
     rules = config.graph
-    window = SearchWindow(
-        rules.overlap_half_xy, rules.overlap_half_xy, math.radians(rules.overlap_half_theta_deg)
-    )
+    window = overlap_window(rules)
     found = compose_many(poses[anchors], relatives)
     covariances = np.zeros((len(scans), 3, 3))
     matched = np.zeros(len(scans), dtype=np.bool_)

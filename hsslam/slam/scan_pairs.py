@@ -6,7 +6,6 @@ tell better how the robot moved in between, and the map how all the way lies.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -14,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import Config
-from hsslam.matching.interface import Matcher, SearchWindow
+from hsslam.matching.interface import Matcher
 from hsslam.se2 import Points, Pose, Poses, between, compose_many
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.scan_table import Rows
-from hsslam.slam.windows import at_edge, difference
+from hsslam.slam.windows import at_edge, difference, overlap_window
 
 
 class ScanPairs:
@@ -68,7 +67,7 @@ def match_with_keyframes(
     """Match every scan against ``graph.rescan_neighbours`` keyframes before it, and as many after it.
 
     Parameters and their order are those of `hsslam.slam.rescan.match_scans`. The search begins where the scan was
-    tracked, which owes nothing to the map that it was matched against meanwhile.
+    tracked, which owes nothing to the map that it is matched against afterwards.
 
     Returns
     -------
@@ -77,9 +76,7 @@ def match_with_keyframes(
     """
     rules, pairs = config.graph, ScanPairs()
     reach = rules.rescan_neighbours
-    window = SearchWindow(
-        rules.overlap_half_xy, rules.overlap_half_xy, math.radians(rules.overlap_half_theta_deg)
-    )
+    window = overlap_window(rules)
     tracked = compose_many(poses[anchors], relatives)
     # The scan that became a keyframe is the first that hangs on it.
     starts = np.append(np.searchsorted(anchors, np.arange(len(poses))), len(scans))

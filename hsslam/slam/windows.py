@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hsslam.config import WindowSection
+from hsslam.config import GraphSection, WindowSection
 from hsslam.kernels.assess import assess
 from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
 from hsslam.se2 import Points, Pose, wrap
@@ -27,6 +27,13 @@ EDGE = 0.9
 def search_window(section: WindowSection) -> SearchWindow:
     """The window a config section describes."""
     return SearchWindow(section.half_x, section.half_y, math.radians(section.half_theta_deg))
+
+
+def overlap_window(rules: GraphSection) -> SearchWindow:
+    """The window of all matches that start from optimised poses."""
+    return SearchWindow(
+        rules.overlap_half_xy, rules.overlap_half_xy, math.radians(rules.overlap_half_theta_deg)
+    )
 
 
 def foreseen_window(
