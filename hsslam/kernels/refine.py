@@ -8,15 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.surface import nearest_segment
+from hsslam.kernels.blocks import LANES, TERMS, add_terms, blocks_of, find_segments, take_variances
 from hsslam.kernels.variances import GRAZING, variances_of
 from hsslam.se2 import Points, Pose, wrap
 
 NO_LINES: NDArray[np.float64] = np.empty((0, 3))
 """Point-to-line only."""
-
-LEAST_AGREEMENT = 0.5
-"""Cosine of the angle between two lines that may be of the same surface, at least."""
 
 
 @kernel
@@ -74,6 +71,8 @@ def refine(
     hessian = np.empty((3, 3))
     right = np.empty(3)
     step = np.empty(3)
+    sums, totals = np.empty(TERMS * LANES), np.empty(TERMS)
+    half, blocks, known = blocks_of(points, lines)
     both = lines.shape[0] > 0
     told = False
     least = GRAZING
@@ -85,62 +84,17 @@ def refine(
         settled = distance <= distances[1] and squared_scale <= scales[1] ** 2
         if settled and not told:
             least = variances_of(pieces, nearest, frame, points, pose, distance, variances)
+            take_variances(variances, half, blocks)
             told = True
         c, s = math.cos(pose[2]), math.sin(pose[2])
         x0, y0 = pose[0], pose[1]
-        xx = xy = xt = yy = yt = tt = gx = gy = gt = 0.0
-        used = 0
-        for i in range(0, points.shape[0], 1 if settled else 2):
-            rx = c * points[i, 0] - s * points[i, 1]
-            ry = s * points[i, 0] + c * points[i, 1]
-            x, y = x0 + rx, y0 + ry
-            k = nearest_segment(nearest, frame, x, y)
-            if k < 0:
-                continue
-            px, py = x - pieces[k, 0], y - pieces[k, 1]
-            along = min(max(px * pieces[k, 2] + py * pieces[k, 3], 0.0), pieces[k, 4])
-            ex, ey = px - along * pieces[k, 2], py - along * pieces[k, 3]
-            if ex * ex + ey * ey > distance * distance:
-                continue
-            nx, ny = pieces[k, 5], pieces[k, 6]
-            mx = my = agreement = 0.0
-            if both:
-                mx, my = c * lines[i, 0] - s * lines[i, 1], s * lines[i, 0] + c * lines[i, 1]
-                agreement = nx * mx + ny * my
-                if agreement < -LEAST_AGREEMENT:
-                    continue
-            residual = nx * x + ny * y - pieces[k, 7]
-            across = nx * rx + ny * ry
-            variance = variances[i] * max(across * across / (rx * rx + ry * ry + 1e-12), least)
-            weight = squared_scale / (variance * squared_scale + residual * residual)
-            nt = ny * rx - nx * ry
-            wx, wy, wt = weight * nx, weight * ny, weight * nt
-            used += 1
-            xx += wx * nx
-            xy += wx * ny
-            xt += wx * nt
-            yy += wy * ny
-            yt += wy * nt
-            tt += wt * nt
-            gx += wx * residual
-            gy += wy * residual
-            gt += wt * residual
-            if not (settled and both) or agreement < LEAST_AGREEMENT:
-                continue
-            sx, sy = x - ex - x0, y - ey - y0
-            residual = lines[i, 2] - mx * sx - my * sy
-            weight = squared_scale / (variances[i] * squared_scale + residual * residual)
-            nt = my * sx - mx * sy
-            wx, wy, wt = weight * mx, weight * my, weight * nt
-            xx += wx * mx
-            xy += wx * my
-            xt += wx * nt
-            yy += wy * my
-            yt += wy * nt
-            tt += wt * nt
-            gx += wx * residual
-            gy += wy * residual
-            gt += wt * residual
+        sums[:] = 0.0
+        for block in range(2 * half if settled else half):
+            find_segments(pieces, nearest, frame, x0, y0, c, s, block, blocks, known)
+            add_terms(x0, y0, c, s, distance**2, squared_scale, least, settled and both, block, blocks, sums)
+        for term in range(TERMS):
+            totals[term] = sums[term * LANES : (term + 1) * LANES].sum()
+        xx, xy, xt, yy, yt, tt, gx, gy, gt, used = totals
         if used < 3:
             return start.copy(), iteration, False
         # Damping in proportion to the whole: a direction that no line fixes (along a corridor) stays put.
