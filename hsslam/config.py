@@ -215,6 +215,12 @@ class GraphSection(Section):
     overlap_min_score: float = Field(
         default=0.35, ge=0.0, le=1.0, description="share of points such a match must explain"
     )
+    threads: int = Field(
+        default=0,
+        ge=0,
+        description="threads that match side by side at the end, with hide, hsl and glasm; what they find does not "
+        "depend on it (0: one for each core, 4 at most)",
+    )
 
 
 class MapSection(Section):

@@ -196,7 +196,29 @@ class ContiguousOnly(Hide):
         return super().match(reference, flat.reshape(-1, 2), guess, window, rng)
 
 
+class ManyOthers(Hide):
+    """Answers to several scans in the order of their lengths."""
+
+    summary = "overrides match_many"
+
+    def match_many(self, reference, scans, guesses, window, rng):
+        order = np.argsort([len(scan) for scan in scans], kind="stable")
+        return super().match_many(reference, [scans[i] for i in order], guesses[order], window, rng)
+
+
+class ManyFewer(Hide):
+    """Leaves out what did not converge."""
+
+    summary = "overrides match_many"
+
+    def match_many(self, reference, scans, guesses, window, rng):
+        found = super().match_many(reference, scans, guesses, window, rng)
+        return found.only(found.converged)
+
+
 BAD = [
+    (ManyOthers, "many"),
+    (ManyFewer, "many"),
     (Lazy, "accuracy"),
     (NeverSays, "result_types"),
     (SinglePrecision, "result_types"),

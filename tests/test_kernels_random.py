@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hsslam.kernels.random import below, next_word, seed_of, seeded, uniform
+from hsslam.kernels.random import below, next_word, seed_of, seeded, seeds_of, uniform
 
 
 def test_words_are_those_of_splitmix64() -> None:
@@ -32,3 +32,4 @@ def test_seeds_differ_from_draw_to_draw_and_repeat_with_the_generator() -> None:
     seeds = [seed_of(first) for _ in range(10)]
     assert seeds == [seed_of(again) for _ in range(10)]
     assert len(set(seeds)) == 10 and min(seeds) >= 0
+    assert seeds_of(np.random.default_rng(3), 10).tolist() == seeds

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hsslam import se2
+from hsslam.kernels.window import inside, kept
 from hsslam.matching import Estimate, Matcher, MatcherConfig, Reference, SearchWindow, clean
 
 WINDOW = SearchWindow(0.3, 0.3, 0.2)
@@ -208,6 +209,19 @@ def test_the_window_is_a_box_around_the_guess(half, offset, guess) -> None:
     expected = all(abs(o) <= h for o, h in zip(offset, half, strict=True))
     borderline = any(abs(abs(o) - h) < 1e-6 for o, h in zip(offset, half, strict=True))
     assert borderline or window.contains(centre, pose) == expected
+    assert inside(centre, window.half, pose) == window.contains(centre, pose)
+    for slack in (0.0, 0.3):
+        expected = window.keep(centre, pose, slack)
+        np.testing.assert_array_equal(kept(centre, window.half, pose, slack), expected)
+
+
+def test_a_pose_that_is_not_finite_is_in_no_window() -> None:
+    window, centre = SearchWindow(1.0, 1.0, 1.0), np.zeros(3)
+    for value in (np.nan, np.inf):
+        for d in range(3):
+            pose = np.where(np.arange(3) == d, value, 0.0)
+            assert not window.contains(centre, pose)
+            assert not inside(centre, window.half, pose)
 
 
 def test_a_reference_builds_its_surface_once(room) -> None:

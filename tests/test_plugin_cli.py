@@ -77,7 +77,7 @@ def test_its_own_tests_pass(package: Path) -> None:
         cwd=package,
     )
     assert done.returncode == 0, done.stdout
-    assert "19 passed" in done.stdout
+    assert "20 passed" in done.stdout
 
 
 def test_check_finds_it_good_and_races_it(package: Path) -> None:
@@ -86,7 +86,7 @@ def test_check_finds_it_good_and_races_it(package: Path) -> None:
         *("plugin", "check", "my_first_matcher", "--plugin", file, "--against", "hide", "--trials", 20)
     )
     assert result.exit_code == 0, result.stdout + result.stderr
-    assert "18 of 18 promises kept" in result.stdout
+    assert "19 of 19 promises kept" in result.stdout
     rows = [line.split() for line in result.stdout.splitlines()]
     assert ["my_first_matcher", "20"] in [row[:2] for row in rows]
     assert ["hide", "20"] in [row[:2] for row in rows]
@@ -139,10 +139,10 @@ class Unmade(Lazy):
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("lazy", ["accuracy", "median answer is", "of 18 promises kept"]),
-        ("gone", ["pickle", "its process ended with exit code 3", "2 of 18 promises kept; 15 were not"]),
+        ("lazy", ["accuracy", "median answer is", "of 19 promises kept"]),
+        ("gone", ["pickle", "its process ended with exit code 3", "2 of 19 promises kept; 16 were not"]),
         ("stuck", ["pickle", "took no step for 5 s and was ended in prepare (bad.py:"]),
-        ("unmade", ["making it", "raised OSError: no such device", "0 of 18"]),
+        ("unmade", ["making it", "raised OSError: no such device", "0 of 19"]),
     ],
 )
 def test_check_says_what_is_wrong(tmp_path: Path, name: str, said: list[str]) -> None:

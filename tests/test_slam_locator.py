@@ -7,7 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from hsslam.config import TrackerSection
-from hsslam.matching.interface import Estimate, Matcher, MatcherConfig, Reference, SearchWindow
+from hsslam.matching.interface import Matcher, MatcherConfig, Reference, SearchWindow
+from hsslam.matching.results import Estimate
 from hsslam.se2 import Points, Pose, pose, transform
 from hsslam.slam.locator import Expectation, Locator
 from hsslam.slam.stopwatch import Stopwatch

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from hsslam.config import Config, load_config
 from hsslam.datasets.simulator import SimulatedDataset
-from hsslam.matching import create
+from hsslam.matching import Matches, MatchResult, create
 from hsslam.se2 import between, between_many, compose, compose_many, pose
 from hsslam.slam.factors import FLOOR_STD_THETA, FLOOR_STD_XY
 from hsslam.slam.pipeline import Slam
@@ -39,6 +39,10 @@ def cauchy(error: Array) -> Array:
     """A residual whose square is the Cauchy loss (2) of the error."""
     length = math.sqrt(error @ error)
     return error * 2.0 * math.sqrt(math.log1p((length / 2.0) ** 2)) / max(length, 1e-12)
+
+
+def matches(relative: Array, covariance: Array) -> Matches:
+    return Matches.of([MatchResult(relative, covariance, 1.0, True, 0)])
 
 
 def dense(
@@ -92,8 +96,8 @@ def test_smooth_is_the_least_squares_solution(rng: np.random.Generator) -> None:
     pairs = ScanPairs()
     for first, second in ((0, 1), (0, 2), (4, 2), (4, 3), (4, 6), (7, 6), (4, 7)):
         relative = compose(between(truth[first], truth[second]), rng.normal(0.0, [0.01, 0.01, 0.005]))
-        pairs.append(first, second, relative, covariance(rng, 0.01))
-    pairs.append(0, 7, pose(9.0, 0.0, 0.0), covariance(rng, 0.01))  # a match that is false, too
+        pairs.extend(first, [second], matches(relative, covariance(rng, 0.01)))
+    pairs.extend(0, [7], matches(pose(9.0, 0.0, 0.0), covariance(rng, 0.01)))  # a match that is false, too
     found = smooth(poses, covariances, matched, pairs, motions, noises)
     expected = dense(poses, covariances, matched, pairs, motions, noises)
     error = between_many(expected, found)

@@ -14,6 +14,7 @@ from hsslam.datasets.dataset import Dataset
 from hsslam.datasets.file import FileDataset
 from hsslam.environment import peak_memory_mb
 from hsslam.live import LiveMap
+from hsslam.memory import give_back
 from hsslam.slam.events import LoopChecked, SlamResult
 from hsslam.slam.folder import RECORDING, RunFolder
 from hsslam.slam.journal import Header
@@ -57,6 +58,7 @@ def run_log(
             result = slam.result()
             solved = time.perf_counter()
         del slam  # the scans that it keeps would lie beside the picture of the map
+        give_back()
         shown.stage("drawing the map")
         drawing = time.perf_counter()
         folder.write_result(result, config, title=title)

@@ -21,6 +21,11 @@ def seed_of(rng: np.random.Generator) -> int:
     return int(rng.bit_generator.random_raw()) >> 1
 
 
+def seeds_of(rng: np.random.Generator, count: int) -> NDArray[np.int64]:
+    """Draw seeds (count,), the same as `seed_of` draws one after the other."""
+    return (rng.bit_generator.random_raw(count) >> np.uint64(1)).astype(np.int64)
+
+
 @kernel
 def seeded(seed: int) -> NDArray[np.uint64]:
     """State of a stream of random numbers, uint64 (1,)."""

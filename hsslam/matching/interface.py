@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, Generic, TypeVar, final
 
@@ -20,7 +20,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from hsslam.kernels.assess import assess
 from hsslam.kernels.surface import Surface, all_finite
-from hsslam.se2 import Points, Pose, wrap
+from hsslam.matching.results import Estimate, Matches, MatchResult
+from hsslam.se2 import Points, Pose, Poses, wrap
 
 MINIMUM_POINTS = 3
 """Fewer points than this, on either side, fix no pose."""
@@ -121,63 +122,6 @@ class Reference:
         self._surface = surface
 
 
-@dataclass(frozen=True)
-class Estimate:
-    """What a plugin found.
-
-    Parameters
-    ----------
-    pose : Pose
-        Pose of the scan in the reference's frame.
-    converged : bool
-        Whether the method says of itself that it succeeded.
-    evaluations : int
-        Fitness evaluations or iterations spent, all included.
-    covariance : float64 (3, 3), optional
-        Of the pose, if the method has one of its own; else the framework computes one.
-    diagnostics : mapping
-        Anything else worth knowing; JSON types only.
-    """
-
-    pose: Pose
-    converged: bool = True
-    evaluations: int = 0
-    covariance: NDArray[np.float64] | None = None
-    diagnostics: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class MatchResult:
-    """The answer to one match.
-
-    Parameters
-    ----------
-    pose : Pose
-        Pose of the scan in the reference's frame. The guess itself where nothing better is known.
-    covariance : float64 (3, 3)
-        Of ``(x, y, theta)`` in the reference's frame (m, m, rad); always positive definite.
-    score : float
-        Share of the scan's points, in [0, 1], that lie within ``score_distance`` of the reference surface at
-        ``pose``: the same yardstick for every matcher.
-    converged : bool
-        False where the method failed, or its answer was rejected.
-    evaluations : int
-        Fitness evaluations or iterations spent.
-    diagnostics : mapping
-        ``rejected`` tells why an answer was refused, ``covariance_rejected`` why the method's own covariance was
-        (the framework's stands in for it); ``degenerate_direction`` (rad, in the reference's frame) is
-        there where the returns leave a direction open, such as that of a plain corridor; the rest is the
-        method's own.
-    """
-
-    pose: Pose
-    covariance: NDArray[np.float64]
-    score: float
-    converged: bool
-    evaluations: int
-    diagnostics: Mapping[str, Any] = field(default_factory=dict)
-
-
 ConfigT = TypeVar("ConfigT", bound=MatcherConfig)
 
 
@@ -205,6 +149,9 @@ class Matcher(ABC, Generic[ConfigT]):
     covers_window: ClassVar[bool] = False
     """Whether a window of a metre and more is searched as well as a small one. Where it is not, because the method
     is local or its effort fixed, a wide window is searched in tiles, each of them a match."""
+
+    side_by_side: ClassVar[bool] = False
+    """Whether `match_many` works without the interpreter lock: on two cores, two threads then match twice as much."""
 
     def __init__(self, config: ConfigT | None = None) -> None:
         self.check_available()
@@ -324,6 +271,42 @@ class Matcher(ABC, Generic[ConfigT]):
             converged=converged,
             evaluations=found.evaluations,
             diagnostics=diagnostics,
+        )
+
+    def match_many(
+        self,
+        reference: Reference,
+        scans: Sequence[Points],
+        guesses: Poses,
+        window: SearchWindow,
+        rng: np.random.Generator,
+    ) -> Matches:
+        """Match several scans against one reference: what `match` answers to one after the other.
+
+        Parameters
+        ----------
+        reference, window, rng
+            As for `match`.
+        scans : sequence of Points
+            (N_i, 2) m each.
+        guesses : Poses
+            (N, 3) where they are thought to be.
+
+        Returns
+        -------
+        Matches
+            The scans' poses, in their order.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `match` does.
+        """
+        return Matches.of(
+            [
+                self.match(reference, scan, guess, window, rng)
+                for scan, guess in zip(scans, guesses, strict=True)
+            ]
         )
 
     def _pose_of(self, found: Any) -> Pose:

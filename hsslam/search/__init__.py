@@ -1,13 +1,14 @@
 """Population searches over a box around a guess: harmony search, differential evolution, HIDE, genetic."""
 
-from hsslam.kernels.random import seed_of
+from hsslam.kernels.random import seed_of, seeds_of
 from hsslam.kernels.raster import Raster
 from hsslam.kernels.surface import Surface
+from hsslam.search.batch import Batch
 from hsslam.search.fitness import HitFitness
 from hsslam.search.fitness_functions import FitnessFunction, fitness_names, register_fitness
-from hsslam.search.genetic import genetic_search
-from hsslam.search.harmony import harmony_search
-from hsslam.search.hide import hide_search
+from hsslam.search.genetic import genetic_search, genetic_search_all
+from hsslam.search.harmony import harmony_search, harmony_search_all
+from hsslam.search.hide import hide_search, hide_search_all
 from hsslam.search.minimize import minimize
 from hsslam.search.population import (
     NO_TRACE,
@@ -18,6 +19,7 @@ from hsslam.search.population import (
 
 __all__ = [
     "NO_TRACE",
+    "Batch",
     "FitnessFunction",
     "HitFitness",
     "PopulationConfig",
@@ -27,9 +29,13 @@ __all__ = [
     "Surface",
     "fitness_names",
     "genetic_search",
+    "genetic_search_all",
     "harmony_search",
+    "harmony_search_all",
     "hide_search",
+    "hide_search_all",
     "minimize",
     "register_fitness",
     "seed_of",
+    "seeds_of",
 ]

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.fitness import evaluate, scratch
+from hsslam.kernels.fitness import evaluate, scale, scratch
 from hsslam.kernels.random import below, seeded, uniform
-from hsslam.se2 import Pose
+from hsslam.se2 import Points, Pose, Poses
+from hsslam.search.batch import part
 
 
 @kernel
@@ -112,6 +113,47 @@ def genetic_search(
     for d in range(3):
         pose[d] = decode(best_genes[d], bits, guess[d], half[d])
     return pose, best_hits, population_size * generations
+
+
+@kernel
+def genetic_search_all(
+    cells: NDArray[np.uint8],
+    frame: NDArray[np.float64],
+    points: Points,
+    ends: NDArray[np.int64],
+    guesses: Poses,
+    most: int,
+    half: NDArray[np.float64],
+    population_size: int,
+    generations: int,
+    bits: int,
+    crossover_rate: float,
+    mutation_rate: float,
+    tournament: int,
+    seeds: NDArray[np.int64],
+) -> tuple[Poses, NDArray[np.int64]]:
+    """`genetic_search` for each scan of a batch; see `hsslam.search.harmony.harmony_search_all`."""
+    found, spent, trace = np.empty_like(guesses), np.empty_like(ends), np.empty((0, 4))
+    for i in range(ends.shape[0]):
+        scan = part(points, ends, i)
+        count = min(most, scan.shape[0])
+        found[i], _, spent[i] = genetic_search(
+            cells,
+            frame,
+            scale(scan, frame[2], count),
+            count,
+            guesses[i],
+            half,
+            population_size,
+            generations,
+            bits,
+            crossover_rate,
+            mutation_rate,
+            tournament,
+            seeds[i],
+            trace,
+        )
+    return found, spent
 
 
 @kernel

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.fitness import evaluate, scratch
+from hsslam.kernels.fitness import evaluate, scale, scratch
 from hsslam.kernels.random import below, seeded, uniform
-from hsslam.se2 import Pose
+from hsslam.se2 import Points, Pose, Poses
+from hsslam.search.batch import part
 
 
 @kernel
@@ -162,3 +163,52 @@ def harmony_search(
             record(trace, memory_size + t, memory, hits)
     best = int(np.argmax(hits))
     return memory[best].copy(), hits[best], memory_size + spent
+
+
+@kernel
+def harmony_search_all(
+    cells: NDArray[np.uint8],
+    frame: NDArray[np.float64],
+    points: Points,
+    ends: NDArray[np.int64],
+    guesses: Poses,
+    most: int,
+    half: NDArray[np.float64],
+    memory_size: int,
+    memory_considering_rate: float,
+    pitch_adjusting_rates: tuple[float, float],
+    bandwidth_min: NDArray[np.float64],
+    bandwidth_max: NDArray[np.float64],
+    improvisations: int,
+    patience: int,
+    seeds: NDArray[np.int64],
+) -> tuple[Poses, NDArray[np.int64]]:
+    """`harmony_search` for each scan of a `hsslam.search.batch.Batch`, with up to ``most`` points and a seed each.
+
+    Returns
+    -------
+    (Poses (N, 3), int64 (N,))
+        Best harmonies, and how often the fitness was evaluated.
+    """
+    found, spent, trace = np.empty_like(guesses), np.empty_like(ends), np.empty((0, 4))
+    for i in range(ends.shape[0]):
+        scan = part(points, ends, i)
+        count = min(most, scan.shape[0])
+        found[i], _, spent[i] = harmony_search(
+            cells,
+            frame,
+            scale(scan, frame[2], count),
+            count,
+            guesses[i],
+            half,
+            memory_size,
+            memory_considering_rate,
+            pitch_adjusting_rates,
+            bandwidth_min,
+            bandwidth_max,
+            improvisations,
+            patience,
+            seeds[i],
+            trace,
+        )
+    return found, spent

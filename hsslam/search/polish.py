@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hsslam.jit import kernel
 from hsslam.kernels.refine import refine
 from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, GAP, lines_of
+from hsslam.kernels.window import inside, kept
 from hsslam.matching.interface import Reference, SearchWindow
 from hsslam.se2 import Points, Pose
 
@@ -26,9 +28,28 @@ WINDOW_SLACK = 0.4
 Where a truth lies near the edge, noise alone carries the refined pose across it."""
 
 
+@kernel
 def scan_lines(points: Points) -> NDArray[np.float64]:
     """Lines through a scan's (N, 2) points as `polish` wants them, see `hsslam.kernels.surface.lines_of`."""
     return lines_of(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
+
+
+@kernel
+def polished(
+    pieces: NDArray[np.float64],
+    nearest: NDArray[np.uint32],
+    frame: NDArray[np.float64],
+    points: Points,
+    lines: NDArray[np.float64],
+    start: Pose,
+    guess: Pose,
+    half: NDArray[np.float64],
+    iterations: int,
+) -> tuple[Pose, int]:
+    """As `polish`; the reference's surface comes first, ``half`` (3,) are the half sides of the window."""
+    pose, spent, _ = refine(pieces, nearest, frame, points, lines, start, iterations, SETTLE, REACHES, SCALES)
+    pose = kept(guess, half, pose, WINDOW_SLACK)
+    return (pose if inside(guess, half, pose) else start.copy()), spent
 
 
 def polish(
@@ -45,17 +66,14 @@ def polish(
     A refinement that leads away from the window is discarded: then the pose is ``start``.
     """
     surface = reference.surface
-    pose, spent, _ = refine(
+    return polished(
         surface.pieces,
         surface.nearest,
         surface.frame,
         points,
         lines,
         start,
+        guess,
+        window.half,
         iterations,
-        SETTLE,
-        REACHES,
-        SCALES,
     )
-    pose = window.keep(guess, pose, WINDOW_SLACK)
-    return pose if window.contains(guess, pose) else start, spent

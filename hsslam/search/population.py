@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, Generic, TypeVar
 
@@ -12,11 +13,12 @@ from pydantic import Field
 
 from hsslam.kernels.raster import Raster
 from hsslam.kernels.surface import Surface
-from hsslam.matching.interface import Estimate, Matcher, MatcherConfig, Reference, SearchWindow, clean
-from hsslam.se2 import Points, Pose
+from hsslam.matching.interface import MINIMUM_POINTS, Matcher, MatcherConfig, Reference, SearchWindow, clean
+from hsslam.matching.results import Estimate, Matches
+from hsslam.se2 import Points, Pose, Poses
+from hsslam.search.batch import Batch, settle_all
 from hsslam.search.fitness import FitnessName, HitFitness, build_raster
-from hsslam.search.polish import polish, scan_lines
-from hsslam.search.slide import slide
+from hsslam.search.settle import settle
 
 NO_TRACE: NDArray[np.float64] = np.empty((0, 4))
 """Nothing is traced."""
@@ -96,6 +98,8 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
     A subclass writes `search`; a config of its own extends `PopulationConfig`.
     """
 
+    side_by_side = True
+
     def prepare(self, points: Points) -> PopulationReference:
         """Rasterise a reference; see `hsslam.matching.Matcher.prepare`."""
         return PopulationReference(clean(points), self.config)
@@ -124,6 +128,67 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
         evaluations: what convergence plots are made from.
         """
 
+    def search_all(
+        self,
+        raster: Raster,
+        batch: Batch,
+        most: int,
+        window: SearchWindow,
+        rng: np.random.Generator,
+    ) -> tuple[Poses, NDArray[np.int64]]:
+        """`search` for each scan of a batch, of which ``most`` points count: poses (N, 3), evaluations spent (N,).
+
+        A subclass whose search is a kernel overrides it with one that stays there from scan to scan.
+        """
+        found, spent = np.empty((len(batch), 3)), np.empty(len(batch), dtype=np.int64)
+        for i, guess in enumerate(batch.guesses):
+            fitness = HitFitness.of(raster, batch.scan(i), most)
+            found[i], _, spent[i] = self.search(fitness, guess, window, rng)
+        return found, spent
+
+    def match_many(
+        self,
+        reference: Reference,
+        scans: Sequence[Points],
+        guesses: Poses,
+        window: SearchWindow,
+        rng: np.random.Generator,
+    ) -> Matches:
+        """Match a batch in kernels; see `hsslam.matching.Matcher.match_many`."""
+        scans = [clean(scan) for scan in scans]
+        fewest = min(map(len, (reference.points, *scans)))
+        # Whoever wrote an `estimate` of their own means it; and `match` knows what to say of too few points.
+        plain = type(self).estimate is PopulationMatcher.estimate and np.isfinite(guesses).all()
+        if not scans or not plain or fewest < MINIMUM_POINTS or guesses.shape != (len(scans), 3):
+            return super().match_many(reference, scans, guesses, window, rng)
+        assert isinstance(reference, PopulationReference)
+        config, batch = self.config, Batch.of(scans, guesses)
+        wide = self.is_wide(window)
+        raster = reference.coarse if wide else reference.raster
+        few = config.refine and not wide
+        found, _ = self.search_all(
+            raster, batch, config.search_points if few else len(batch.points), window, rng
+        )
+        surface = reference.surface
+        return Matches(
+            *settle_all(
+                surface.pieces,
+                surface.tilts,
+                surface.nearest,
+                surface.frame,
+                raster.cells,
+                raster.frame,
+                batch.points,
+                batch.ends,
+                batch.guesses,
+                found,
+                window.half,
+                config.refine_iterations if config.refine else 0,
+                0.0 if wide else config.half_side,
+                config.score_distance,
+            )
+        )
+
     def estimate(
         self,
         reference: Reference,
@@ -142,16 +207,18 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
         diagnostics: dict[str, Any] = {"fitness": fitness.share(hits)}
         if not self.config.refine:
             return Estimate(found, evaluations=evaluations, diagnostics=diagnostics)
-        lines = scan_lines(points)
-
-        def refined(start: Pose) -> tuple[Pose, int]:
-            return polish(reference, points, lines, start, guess, window, self.config.refine_iterations)
-
-        pose, diagnostics["refine_iterations"] = refined(found)
-        if not wide:
-            elsewhere, looked = slide(raster, points, lines, pose, guess, window, self.config.half_side)
-            evaluations += looked
-            if elsewhere is not None:
-                pose, spent = refined(elsewhere)
-                diagnostics["refine_iterations"] += spent
-        return Estimate(pose, evaluations=evaluations, diagnostics=diagnostics)
+        surface = reference.surface
+        pose, diagnostics["refine_iterations"], looked = settle(
+            surface.pieces,
+            surface.nearest,
+            surface.frame,
+            raster.cells,
+            raster.frame,
+            points,
+            found,
+            guess,
+            window.half,
+            self.config.refine_iterations,
+            0.0 if wide else self.config.half_side,
+        )
+        return Estimate(pose, evaluations=evaluations + looked, diagnostics=diagnostics)

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.fitness import evaluate, scratch
+from hsslam.kernels.fitness import evaluate, scale, scratch
 from hsslam.kernels.raster import Raster
 from hsslam.matching.interface import SearchWindow
 from hsslam.se2 import Points, Pose
-from hsslam.search.fitness import HitFitness
 
 WEAK = 0.2
 """A direction is hardly fixed where this share of what fixes the other one fixes it, or less."""
@@ -55,14 +54,8 @@ def slide(
     (Pose or None, int)
         The pose with most hits, if it has `GAIN` more than ``pose``, and how many poses were looked at.
     """
-    direction = weak_direction(lines)
-    if math.isnan(direction):
-        return None, 0
-    fitness = HitFitness.of(raster, points)
-    found, gained, spent = _slide(
-        fitness.cells, fitness.frame, fitness.scaled, fitness.count, direction, pose, guess, window.half, step
-    )
-    return (found if fitness.share(gained) > GAIN else None), spent
+    better, found, looked = slid(raster.cells, raster.frame, points, lines, pose, guess, window.half, step)
+    return (found if better else None), looked
 
 
 @kernel
@@ -81,19 +74,26 @@ def weak_direction(lines: NDArray[np.float64]) -> float:
 
 
 @kernel
-def _slide(
+def slid(
     cells: NDArray[np.uint8],
     frame: NDArray[np.float64],
-    scaled: NDArray[np.float32],
-    count: int,
-    direction: float,
+    points: Points,
+    lines: NDArray[np.float64],
     pose: Pose,
     guess: Pose,
     half: NDArray[np.float64],
     step: float,
-) -> tuple[Pose, int, int]:
-    """See `slide`: the best pose, its hits beyond those of ``pose``, poses looked at."""
+) -> tuple[bool, Pose, int]:
+    """As `slide`: whether a better pose was found, that pose, poses looked at.
+
+    The raster's arrays come first, ``half`` (3,) are the half sides of the window.
+    """
     best = pose.copy()
+    direction = weak_direction(lines)
+    if math.isnan(direction):
+        return False, best, 0
+    count = points.shape[0]
+    scaled = scale(points, frame[2], count)
     flat, xs, ys, index = cells.reshape(cells.size), scaled[0], scaled[1], scratch()
     x, y, theta = pose
     here = evaluate(flat, cells.shape, frame, xs, ys, count, x, y, theta, 0, index)
@@ -109,4 +109,4 @@ def _slide(
         if hits > most:
             most = hits
             best[0], best[1] = x, y
-    return best, most - here, spent
+    return most - here > GAIN * frame[3] * count, best, spent

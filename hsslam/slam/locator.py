@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import TrackerSection
-from hsslam.matching.interface import MINIMUM_POINTS, Matcher, MatchResult, SearchWindow
+from hsslam.matching.interface import MINIMUM_POINTS, Matcher, SearchWindow
+from hsslam.matching.results import MatchResult
 from hsslam.se2 import Points, Pose
 from hsslam.slam.fusion import GATE, squared_mahalanobis
 from hsslam.slam.motion import way

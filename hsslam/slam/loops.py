@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import Config
-from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
+from hsslam.matching.interface import Matcher, Reference, SearchWindow
+from hsslam.matching.results import MatchResult
 from hsslam.se2 import Points, Pose, Poses, between, compose, inverse, wrap
 from hsslam.slam.events import LoopChecked
 from hsslam.slam.far import NEAR, FarSearch

@@ -7,6 +7,8 @@ only consecutive keyframes and loops.
 from __future__ import annotations
 
 import math
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -14,10 +16,11 @@ from numpy.typing import NDArray
 
 from hsslam.config import Config
 from hsslam.jit import kernel
-from hsslam.matching.interface import Matcher, Reference
-from hsslam.se2 import Points, Poses, between, between_many, wrap
+from hsslam.matching.interface import Matcher
+from hsslam.se2 import Points, Poses, between_many, wrap
 from hsslam.slam.events import Edge
 from hsslam.slam.randomness import Purpose, generator
+from hsslam.slam.side_by_side import side_by_side, threads_for
 from hsslam.slam.windows import overlap_window
 
 SPREAD = 2
@@ -81,22 +84,28 @@ def match_pairs(
     pairs: list[tuple[int, int]],
     stage: int,
 ) -> list[Edge]:
-    """Match each pair from its current relative pose; constraints that were found are returned."""
+    """Match each pair from its current relative pose; constraints that were found are returned.
+
+    The pairs, sorted, are matched side by side where the matcher can.
+    """
     rules = config.graph
     window = overlap_window(rules)
-    edges: list[Edge] = []
-    reference: Reference | None = None
-    prepared = -1
-    for first, second in pairs:
-        if prepared != first or reference is None:
-            reference = matcher.prepare(points[first])
-            prepared = first
-        guess = between(poses[first], poses[second])
-        rng = generator(config.seed, Purpose.OVERLAP, stage, first, second)
-        result = matcher.match(reference, points[second], guess, window, rng)
-        if result.converged and result.score >= rules.overlap_min_score:
-            edges.append(Edge(first, second, result.pose, result.covariance, "overlap"))
-    return edges
+    groups = [(first, [pair[1] for pair in group]) for first, group in groupby(pairs, itemgetter(0))]
+
+    def matched(number: int) -> list[Edge]:
+        first, seconds = groups[number]
+        reference = matcher.prepare(points[first])
+        guesses = between_many(np.tile(poses[first], (len(seconds), 1)), poses[seconds])
+        rng = generator(config.seed, Purpose.OVERLAP, stage, first)
+        found = matcher.match_many(reference, [points[second] for second in seconds], guesses, window, rng)
+        good = found.converged & (found.scores >= rules.overlap_min_score)
+        return [
+            Edge(first, seconds[i], found.poses[i], found.covariances[i], "overlap")
+            for i in np.flatnonzero(good).tolist()
+        ]
+
+    threads = threads_for(matcher, rules.threads)
+    return [edge for edges in side_by_side(matched, len(groups), threads) for edge in edges]
 
 
 def moved(pairs: list[tuple[int, int]], before: Poses, after: Poses) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from hsslam.config import Config
 from hsslam.errors import DataError
+from hsslam.memory import give_back
 from hsslam.scan import LaserScan
 from hsslam.se2 import Points, Poses, between_many, compose, compose_many
 from hsslam.slam.events import (
@@ -184,6 +185,7 @@ class Slam:
             # The smoother is what takes most memory of all.
             del known
             scans.points, self._points = [], []
+            give_back()
         poses = smooth(found, covariances, matched, pairs, scans.motions, scans.noises)
         scans.relatives[:] = between_many(graph.poses[scans.anchors], poses)
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
+from hsslam.matching.interface import Matcher, Reference, SearchWindow
+from hsslam.matching.results import MatchResult
 from hsslam.se2 import Points, Pose, wrap
 
 OVERLAP = 0.75

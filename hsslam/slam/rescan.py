@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import Config
-from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
-from hsslam.se2 import Points, Pose, Poses, between, compose, compose_many
+from hsslam.matching.interface import Matcher, Reference, SearchWindow
+from hsslam.matching.results import MatchResult
+from hsslam.se2 import Points, Pose, Poses, between_many, compose_many
 from hsslam.slam.fusion import rotated
 from hsslam.slam.randomness import Purpose, generator
+from hsslam.slam.side_by_side import side_by_side, threads_for
 from hsslam.slam.submap import merge
-from hsslam.slam.windows import AGREEING, at_edge, difference, known_within, overlap_window
+from hsslam.slam.windows import AGREEING, at_edges, differences, known_within, overlap_window
 
 BLOCK = 4
 """Keyframes in a row whose scans are matched against the same submap."""
@@ -109,48 +111,58 @@ def match_scans(
     found = compose_many(poses[anchors], relatives)
     covariances = np.zeros((len(scans), 3, 3))
     matched = np.zeros(len(scans), dtype=np.bool_)
-    for first in range(0, len(poses), BLOCK):
+
+    def match_block(number: int) -> None:
+        first = number * BLOCK
         last = min(first + BLOCK, len(poses)) - 1
         start, stop = np.searchsorted(anchors, [first, last + 1])
         chosen = start + np.flatnonzero(wanted[start:stop])
         if not len(chosen):
-            continue
+            return
         around = surrounding(poses, first, last, rules.overlap_radius, rules.rescan_keyframes)
         origin: Pose = poses[(first + last) // 2].copy()
+        origins = np.tile(origin, (len(chosen), 1))
         reference = matcher.prepare(merge([keyframe_points[k] for k in around], poses[around], origin))
-        for i in chosen.tolist():
-            guess = between(origin, found[i])
-            rng = generator(config.seed, Purpose.SCAN, i)
-            points = scans[i].astype(np.float64)
-            result = matcher.match(reference, points, guess, window, rng)
-            if _apart(result.pose, guess, AWAY):
-                result = _unless_confirmed(matcher, reference, points, guess, window, result, rng)
-            inside = not at_edge(difference(result.pose, guess), window)
-            matched[i] = result.converged and inside and result.score >= rules.overlap_min_score
-            if matched[i]:
-                found[i] = compose(origin, result.pose)
-            covariances[i] = rotated(result.covariance, -origin[2])
+        guesses, rng = between_many(origins, found[chosen]), generator(config.seed, Purpose.SCAN, first)
+        points = [scans[i].astype(np.float64) for i in chosen]
+        results = matcher.match_many(reference, points, guesses, window, rng)
+        for k in np.flatnonzero(_apart(results.poses, guesses, AWAY)).tolist():
+            near = _confirmed(matcher, reference, points[k], guesses[k], window, results.scores[k], rng)
+            if near is not None:
+                results.put(k, near)
+        good = results.converged & (results.scores >= rules.overlap_min_score)
+        good &= ~at_edges(differences(results.poses, guesses), window)
+        matched[chosen] = good
+        found[chosen[good]] = compose_many(origins, results.poses)[good]
+        covariances[chosen] = [rotated(covariance, -origin[2]) for covariance in results.covariances]
+
+    blocks = -(-len(poses) // BLOCK)
+    for _ in side_by_side(match_block, blocks, threads_for(matcher, rules.threads)):
+        pass
     return found, covariances, matched
 
 
-def _unless_confirmed(
+def _confirmed(
     matcher: Matcher[Any],
     reference: Reference,
     points: Points,
     tracked: Pose,
     window: SearchWindow,
-    found: MatchResult,
+    score: float,
     rng: np.random.Generator,
-) -> MatchResult:
-    """What was found, unless the scan fits about as well where it was tracked: people and clutter draw it away."""
+) -> MatchResult | None:
+    """A match right where the scan was tracked, if it confirms that and fits about as well as ``score``.
+
+    People and clutter draw a scan away.
+    """
     near = matcher.match(reference, points, tracked, AGREEING, rng)
-    lower = near.score < found.score - STAYING_GAIN
-    if not near.converged or lower or _apart(near.pose, tracked, STAYING):
-        return found
+    lower = near.score < score - STAYING_GAIN
+    if not near.converged or lower or _apart(near.pose[None], tracked[None], STAYING)[0]:
+        return None
     return known_within(matcher, window, reference, points, near)
 
 
-def _apart(pose: Pose, other: Pose, least: tuple[float, float]) -> bool:
-    """Whether two poses differ by more than a distance (m) or an angle (rad)."""
-    x, y, theta = difference(pose, other)
-    return math.hypot(x, y) > least[0] or abs(theta) > least[1]
+def _apart(poses: Poses, others: Poses, least: tuple[float, float]) -> NDArray[np.bool_]:
+    """Which poses (N, 3) differ from others by more than a distance (m) or an angle (rad), (N,)."""
+    off = differences(poses, others)
+    return (np.hypot(off[:, 0], off[:, 1]) > least[0]) | (np.abs(off[:, 2]) > least[1])

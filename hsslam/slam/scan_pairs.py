@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 
 from hsslam.config import Config
 from hsslam.matching.interface import Matcher
-from hsslam.se2 import Points, Pose, Poses, between, compose_many
+from hsslam.matching.results import Matches
+from hsslam.se2 import Points, Pose, Poses, between_many, compose_many
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.scan_table import Rows
-from hsslam.slam.windows import at_edge, difference, overlap_window
+from hsslam.slam.side_by_side import side_by_side, threads_for
+from hsslam.slam.windows import at_edges, differences, overlap_window
 
 
 class ScanPairs:
@@ -26,21 +28,20 @@ class ScanPairs:
     def __init__(self) -> None:
         self._scans, self._relatives, self._covariances = Rows(2, dtype=np.int64), Rows(3), Rows(3, 3)
 
-    def append(self, first: int, second: int, relative: Pose, covariance: NDArray[np.float64]) -> None:
-        """Add a match.
+    def extend(self, first: int, seconds: Sequence[int], matches: Matches) -> None:
+        """Add matches against one scan.
 
         Parameters
         ----------
-        first, second : int
-            Numbers of the scans.
-        relative : Pose
-            Of the second, in the frame of the first.
-        covariance : float64 (3, 3)
-            In the frame of the first (m, m, rad).
+        first, seconds : int, sequence of int
+            Number of the scan, and those of the scans that were matched against it.
+        matches : Matches
+            Of the seconds, in the frame of the first.
         """
-        self._scans.append((first, second))
-        self._relatives.append(relative)
-        self._covariances.append(covariance)
+        for second, relative, covariance in zip(seconds, matches.poses, matches.covariances, strict=True):
+            self._scans.append((first, second))
+            self._relatives.append(relative)
+            self._covariances.append(covariance)
 
     def __len__(self) -> int:
         return len(self._scans)
@@ -76,23 +77,29 @@ def match_with_keyframes(
     """
     rules, pairs = config.graph, ScanPairs()
     reach = rules.rescan_neighbours
+    if not reach:
+        return pairs
     window = overlap_window(rules)
     tracked = compose_many(poses[anchors], relatives)
     # The scan that became a keyframe is the first that hangs on it.
-    starts = np.append(np.searchsorted(anchors, np.arange(len(poses))), len(scans))
-    for k in range(len(poses)):
-        own = int(starts[k])
+    starts = np.append(np.searchsorted(anchors, np.arange(len(poses))), len(scans)).tolist()
+
+    def matched(k: int) -> tuple[list[int], Matches]:
+        own = starts[k]
         around = range(starts[max(k - reach, 0)], starts[min(k + reach, len(poses))])
-        if not reach or len(around) < 2:
-            continue
-        reference = matcher.prepare(keyframe_points[k])
-        for i in around:
-            if i == own:
-                continue
-            guess = between(poses[k], tracked[i])
-            rng = generator(config.seed, Purpose.PAIR, own, i)
-            result = matcher.match(reference, scans[i].astype(np.float64), guess, window, rng)
-            inside = not at_edge(difference(result.pose, guess), window)
-            if result.converged and inside and result.score >= rules.overlap_min_score:
-                pairs.append(own, i, result.pose, result.covariance)
+        others = [i for i in around if i != own]
+        if not others:
+            return others, Matches.of([])
+        guesses = between_many(np.tile(poses[k], (len(others), 1)), tracked[others])
+        rng = generator(config.seed, Purpose.PAIR, own)
+        points = [scans[i].astype(np.float64) for i in others]
+        found = matcher.match_many(matcher.prepare(keyframe_points[k]), points, guesses, window, rng)
+        good = found.converged & (found.scores >= rules.overlap_min_score)
+        good &= ~at_edges(differences(found.poses, guesses), window)
+        return [others[i] for i in np.flatnonzero(good)], found.only(good)
+
+    for k, (others, matches) in enumerate(
+        side_by_side(matched, len(poses), threads_for(matcher, rules.threads))
+    ):
+        pairs.extend(starts[k], others, matches)
     return pairs

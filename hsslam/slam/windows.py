@@ -7,11 +7,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hsslam.config import GraphSection, WindowSection
 from hsslam.kernels.assess import assess
-from hsslam.matching.interface import Matcher, MatchResult, Reference, SearchWindow
-from hsslam.se2 import Points, Pose, wrap
+from hsslam.matching.interface import Matcher, Reference, SearchWindow
+from hsslam.matching.results import MatchResult
+from hsslam.se2 import Points, Pose, Poses, wrap
 from hsslam.slam.recovery import match_tiles
 
 SIGMAS = 3.0
@@ -95,6 +97,19 @@ def at_edge(off: Pose, window: SearchWindow) -> bool:
         or abs(y) > EDGE * window.half_y
         or abs(theta) > EDGE * window.half_theta
     )
+
+
+def differences(poses: Poses, others: Poses) -> Poses:
+    """`difference` row by row: (N, 3) and (N, 3) to (N, 3)."""
+    off: Poses = poses - others
+    off[:, 2] = (off[:, 2] + math.pi) % math.tau - math.pi
+    return off
+
+
+def at_edges(off: Poses, window: SearchWindow) -> NDArray[np.bool_]:
+    """`at_edge` row by row: (N, 3) to (N,)."""
+    beyond: NDArray[np.bool_] = np.any(np.abs(off) > EDGE * window.half, axis=1)
+    return beyond
 
 
 def _between(value: float, least: float, most: float) -> float:

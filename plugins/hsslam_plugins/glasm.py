@@ -6,8 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from hsslam.matching import Pose, SearchWindow
-from hsslam.search import NO_TRACE, HitFitness, PopulationConfig, PopulationMatcher, genetic_search, seed_of
+from hsslam.matching import Pose, Poses, SearchWindow
+from hsslam.search import (
+    NO_TRACE,
+    Batch,
+    HitFitness,
+    PopulationConfig,
+    PopulationMatcher,
+    Raster,
+    genetic_search,
+    genetic_search_all,
+    seed_of,
+    seeds_of,
+)
 from hsslam.search.fitness import FitnessName
 
 
@@ -57,7 +68,6 @@ class Glasm(PopulationMatcher[GlasmConfig]):
         trace: NDArray[np.float64] = NO_TRACE,
     ) -> tuple[Pose, int, int]:
         """See `hsslam.search.genetic_search`."""
-        config = self.config
         return genetic_search(
             fitness.cells,
             fitness.frame,
@@ -65,12 +75,41 @@ class Glasm(PopulationMatcher[GlasmConfig]):
             fitness.count,
             guess,
             window.half,
+            *self._settings,
+            seed_of(rng),
+            trace,
+        )
+
+    def search_all(
+        self,
+        raster: Raster,
+        batch: Batch,
+        most: int,
+        window: SearchWindow,
+        rng: np.random.Generator,
+    ) -> tuple[Poses, NDArray[np.int64]]:
+        """See `hsslam.search.genetic_search_all`."""
+        return genetic_search_all(
+            raster.cells,
+            raster.frame,
+            batch.points,
+            batch.ends,
+            batch.guesses,
+            most,
+            window.half,
+            *self._settings,
+            seeds_of(rng, len(batch)),
+        )
+
+    @property
+    def _settings(self) -> tuple[int, int, int, float, float, int]:
+        """What `genetic_search` is told of the search."""
+        config = self.config
+        return (
             config.population_size,
             config.generations,
             config.bits,
             config.crossover_rate,
             config.mutation_rate,
             config.tournament,
-            seed_of(rng),
-            trace,
         )

@@ -6,7 +6,7 @@ import math
 from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Generic, TypeVar
+from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +95,11 @@ class Effort:
     bandwidth_max: NDArray[np.float64]
 
 
+HarmonySettings: TypeAlias = tuple[
+    int, float, tuple[float, float], NDArray[np.float64], NDArray[np.float64], int
+]
+"""HMS, HMCR, PAR_min and PAR_max, BW_min, BW_max, and the budget: what the kernels of both searches take first."""
+
 HarmonyConfigT = TypeVar("HarmonyConfigT", bound=HarmonyConfig)
 
 
@@ -111,6 +116,18 @@ class HarmonyMatcher(PopulationMatcher[HarmonyConfigT], Generic[HarmonyConfigT])
     def is_wide(self, window: SearchWindow) -> bool:
         """Whether the window is far larger than the paper's."""
         return self.effort(window).wide
+
+    def harmony_settings(self, window: SearchWindow) -> HarmonySettings:
+        """What a search in a window is told of the harmony memory."""
+        config, effort = self.config, self.effort(window)
+        return (
+            effort.memory_size,
+            config.memory_considering_rate,
+            config.pitch_adjusting_rates,
+            effort.bandwidth_min,
+            effort.bandwidth_max,
+            effort.budget,
+        )
 
     def effort(self, window: SearchWindow) -> Effort:
         """Parameters for a window; as configured unless it is wide (and ``wide_windows`` is on)."""

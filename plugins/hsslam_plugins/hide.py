@@ -6,9 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from hsslam.matching import Pose, SearchWindow
-from hsslam.search import NO_TRACE, HitFitness, hide_search, seed_of
-from hsslam_plugins.harmony import HarmonyConfig, HarmonyMatcher
+from hsslam.matching import Pose, Poses, SearchWindow
+from hsslam.search import (
+    NO_TRACE,
+    Batch,
+    HitFitness,
+    Raster,
+    hide_search,
+    hide_search_all,
+    seed_of,
+    seeds_of,
+)
+from hsslam_plugins.harmony import HarmonyConfig, HarmonyMatcher, HarmonySettings
 
 WIDE_WEIGHT = 0.8
 """F in wide windows: the published 0.44 gathers the memory in one basin before it has seen the others."""
@@ -57,8 +66,6 @@ class Hide(HarmonyMatcher[HideConfig]):
         trace: NDArray[np.float64] = NO_TRACE,
     ) -> tuple[Pose, int, int]:
         """See `hsslam.search.hide_search`."""
-        config = self.config
-        scaled = self.effort(window)
         return hide_search(
             fitness.cells,
             fitness.frame,
@@ -66,17 +73,40 @@ class Hide(HarmonyMatcher[HideConfig]):
             fitness.count,
             guess,
             window.half,
-            scaled.memory_size,
-            config.memory_considering_rate,
-            config.pitch_adjusting_rates,
-            scaled.bandwidth_min,
-            scaled.bandwidth_max,
-            scaled.budget,
-            config.harmony_run,
-            config.attraction,
-            WIDE_WEIGHT if scaled.wide else config.weight,
-            config.crossover_rate,
-            config.patience,
+            *self._settings(window),
             seed_of(rng),
             trace,
+        )
+
+    def search_all(
+        self,
+        raster: Raster,
+        batch: Batch,
+        most: int,
+        window: SearchWindow,
+        rng: np.random.Generator,
+    ) -> tuple[Poses, NDArray[np.int64]]:
+        """See `hsslam.search.hide_search_all`."""
+        return hide_search_all(
+            raster.cells,
+            raster.frame,
+            batch.points,
+            batch.ends,
+            batch.guesses,
+            most,
+            window.half,
+            *self._settings(window),
+            seeds_of(rng, len(batch)),
+        )
+
+    def _settings(self, window: SearchWindow) -> tuple[*HarmonySettings, int, float, float, float, int]:
+        """What `hide_search` is told of the search."""
+        config = self.config
+        return (
+            *self.harmony_settings(window),
+            config.harmony_run,
+            config.attraction,
+            WIDE_WEIGHT if self.is_wide(window) else config.weight,
+            config.crossover_rate,
+            config.patience,
         )

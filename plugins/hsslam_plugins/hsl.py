@@ -6,9 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from hsslam.matching import Pose, SearchWindow
-from hsslam.search import NO_TRACE, HitFitness, harmony_search, seed_of
-from hsslam_plugins.harmony import HarmonyConfig, HarmonyMatcher
+from hsslam.matching import Pose, Poses, SearchWindow
+from hsslam.search import (
+    NO_TRACE,
+    Batch,
+    HitFitness,
+    Raster,
+    harmony_search,
+    harmony_search_all,
+    seed_of,
+    seeds_of,
+)
+from hsslam_plugins.harmony import HarmonyConfig, HarmonyMatcher, HarmonySettings
 
 
 class HslConfig(HarmonyConfig):
@@ -37,8 +46,6 @@ class Hsl(HarmonyMatcher[HslConfig]):
         trace: NDArray[np.float64] = NO_TRACE,
     ) -> tuple[Pose, int, int]:
         """See `hsslam.search.harmony_search`."""
-        config = self.config
-        scaled = self.effort(window)
         return harmony_search(
             fitness.cells,
             fitness.frame,
@@ -46,13 +53,32 @@ class Hsl(HarmonyMatcher[HslConfig]):
             fitness.count,
             guess,
             window.half,
-            scaled.memory_size,
-            config.memory_considering_rate,
-            config.pitch_adjusting_rates,
-            scaled.bandwidth_min,
-            scaled.bandwidth_max,
-            scaled.budget,
-            config.patience,
+            *self._settings(window),
             seed_of(rng),
             trace,
         )
+
+    def search_all(
+        self,
+        raster: Raster,
+        batch: Batch,
+        most: int,
+        window: SearchWindow,
+        rng: np.random.Generator,
+    ) -> tuple[Poses, NDArray[np.int64]]:
+        """See `hsslam.search.harmony_search_all`."""
+        return harmony_search_all(
+            raster.cells,
+            raster.frame,
+            batch.points,
+            batch.ends,
+            batch.guesses,
+            most,
+            window.half,
+            *self._settings(window),
+            seeds_of(rng, len(batch)),
+        )
+
+    def _settings(self, window: SearchWindow) -> tuple[*HarmonySettings, int]:
+        """What `harmony_search` is told of the search."""
+        return (*self.harmony_settings(window), self.config.patience)

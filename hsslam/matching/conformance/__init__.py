@@ -41,6 +41,7 @@ _CHECKS: tuple[Check, ...] = (
     answers.check_window,
     answers.check_determinism,
     answers.check_threads,
+    answers.check_many,
     inputs.check_inputs_untouched,
     inputs.check_array_layouts,
     inputs.check_not_finite_rows,

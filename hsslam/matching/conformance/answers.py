@@ -21,7 +21,8 @@ from hsslam.matching.conformance.probe import (
     require_equal,
 )
 from hsslam.matching.conformance.room import guesses, room_pair
-from hsslam.matching.interface import Matcher, MatchResult, SearchWindow
+from hsslam.matching.interface import Matcher, SearchWindow
+from hsslam.matching.results import MatchResult
 from hsslam.se2 import compose, transform, wrap
 
 TRIALS = 9
@@ -165,3 +166,32 @@ def check_threads(matcher: Matcher[Any]) -> None:
         threaded = list(pool.map(lambda trial: run(shared, trial), range(len(starts))))
     for one, two in zip(serial, threaded, strict=True):
         require_equal(two, one, "two threads give another result than one")
+
+
+def check_many(matcher: Matcher[Any]) -> None:
+    """`match_many` answers to several scans what `match` answers to one after the other."""
+    room, other = room_pair(0), room_pair(1)
+    reference = matcher.prepare(room.reference)
+    scans = [room.scan, other.scan, room.scan[:2], room.scan[::2], np.vstack((room.scan, [[np.nan, 0.0]]))]
+    starts = guesses(room.truth, WINDOW.half, len(scans))
+    # With a scan of too few points among the others, without it, and with nothing to match.
+    for chosen in (list(range(len(scans))), [0, 1, 3, 4], []):
+        rng, again = generator(), generator()
+        found = matcher.match_many(reference, [scans[i] for i in chosen], starts[chosen], WINDOW, rng)
+        require(
+            len(found.poses)
+            == len(found.covariances)
+            == len(found.scores)
+            == len(found.converged)
+            == len(chosen),
+            f"match_many answers to {len(chosen)} scans with {len(found.poses)} poses",
+        )
+        for k, i in enumerate(chosen):
+            single = matcher.match(reference, scans[i], starts[i], WINDOW, again)
+            same = (
+                np.array_equal(found.poses[k], single.pose)
+                and np.array_equal(found.covariances[k], single.covariance)
+                and found.scores[k] == single.score
+                and found.converged[k] == single.converged
+            )
+            require(same, f"match_many: pose {found.poses[k]}, where match finds {single.pose}")

@@ -14,7 +14,8 @@ from hsslam.matching.conformance.probe import (
     require,
     require_equal,
 )
-from hsslam.matching.interface import Matcher, MatcherConfig, MatchResult
+from hsslam.matching.interface import Matcher, MatcherConfig
+from hsslam.matching.results import MatchResult
 
 
 def check_config(matcher: Matcher[Any]) -> None:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from hsslam.matching.conformance.room import room_pair
-from hsslam.matching.interface import Matcher, MatchResult, SearchWindow
+from hsslam.matching.interface import Matcher, SearchWindow
+from hsslam.matching.results import MatchResult
 from hsslam.se2 import Points, Pose, wrap
 
 WINDOW = SearchWindow(0.2, 0.2, np.radians(10.0))
