@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hsslam.jit import kernel
 from hsslam.se2 import Points, Pose, transform
 
 
@@ -95,13 +97,9 @@ class LaserScan:
     @cached_property
     def points(self) -> Points:
         """Returns in the laser's frame in beam order, (N, 2) m."""
-        valid = self.valid
-        r = self.ranges[valid]
-        cosines, sines = _directions(self.geometry, len(self.ranges))
-        points = np.empty((len(r), 2))
-        np.multiply(r, cosines[valid], out=points[:, 0])
-        np.multiply(r, sines[valid], out=points[:, 1])
-        return points
+        ranges = np.ascontiguousarray(self.ranges, dtype=np.float64)
+        cosines, sines = _directions(self.geometry, len(ranges))
+        return _returns(ranges, cosines, sines, self.geometry.range_min, self.geometry.range_max)
 
     @cached_property
     def robot_points(self) -> Points:
@@ -114,6 +112,25 @@ class LaserScan:
             seconds = self.geometry.time_increment * np.flatnonzero(self.valid)
             points = _moved(points, seconds[:, None] * self.velocity)
         return points if self.geometry.angle_increment > 0.0 else points[::-1].copy()
+
+
+@kernel
+def _returns(
+    ranges: NDArray[np.float64],
+    cosines: NDArray[np.float64],
+    sines: NDArray[np.float64],
+    range_min: float,
+    range_max: float,
+) -> Points:
+    """Points of the readings that are `LaserScan.valid`, along beams of these cosines and sines (B,)."""
+    points = np.empty((ranges.shape[0], 2))
+    count = 0
+    for i in range(ranges.shape[0]):
+        r = ranges[i]
+        if math.isfinite(r) and r > 0.0 and range_min <= r < range_max:
+            points[count, 0], points[count, 1] = r * cosines[i], r * sines[i]
+            count += 1
+    return points[:count].copy()
 
 
 def _moved(points: Points, twists: NDArray[np.float64]) -> Points:

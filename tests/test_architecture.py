@@ -58,7 +58,7 @@ ALLOWED = {
         "hsslam.registry",
         "hsslam.validation",
     ),
-    "hsslam.scan": ("hsslam.se2",),
+    "hsslam.scan": ("hsslam.jit", "hsslam.se2"),
     "hsslam.trajectory": ("hsslam.se2",),
     "hsslam_plugins": ("hsslam_plugins", "hsslam.matching", "hsslam.search", "hsslam.errors"),
 }

@@ -17,8 +17,8 @@ CellT = TypeVar("CellT", np.uint8, np.uint32)
 def make_room(
     cells: NDArray[CellT],
     frame: NDArray[np.float64],
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
+    low: tuple[float, float],
+    high: tuple[float, float],
     fill: int,
     most: int,
 ) -> tuple[NDArray[CellT], NDArray[np.float64]] | None:
@@ -30,7 +30,7 @@ def make_room(
         The raster; itself the answer if the box is inside its border of one cell.
     frame : float64 (F,)
         Position (m) of the corner of cell (0, 0), cells per metre; what follows is kept.
-    low, high : float64 (2,)
+    low, high : (float, float)
         Corners of the box (m).
     fill : int
         What new cells hold.
@@ -42,21 +42,25 @@ def make_room(
     (array, float64 (F,)) or None
         Cells and frame; None where a side would be longer than ``most``.
     """
-    per_metre = frame[2]
-    rows, columns = cells.shape
-    size = np.array([columns, rows])
-    first = np.floor((low - frame[:2]) * per_metre).astype(np.int64)
-    last = np.floor((high - frame[:2]) * per_metre).astype(np.int64)
-    if (first >= 1).all() and (last <= size - 2).all():
-        return cells, frame
+    per_metre = float(frame[2])
+    before, after = [0, 0], [0, 0]
     margin = math.ceil(MARGIN * per_metre)
-    before = np.where(first < 1, 1 - first + margin, 0)
-    after = np.where(last > size - 2, last - size + 2 + margin, 0)
-    new_columns, new_rows = (int(v) for v in size + before + after)
+    # One axis after the other, in plain numbers: most boxes are inside, and arrays of two take longer to tell.
+    for axis, size in enumerate(reversed(cells.shape)):
+        first = math.floor((low[axis] - float(frame[axis])) * per_metre)
+        last = math.floor((high[axis] - float(frame[axis])) * per_metre)
+        if first < 1:
+            before[axis] = 1 - first + margin
+        if last > size - 2:
+            after[axis] = last - size + 2 + margin
+    if before == after == [0, 0]:
+        return cells, frame
+    rows, columns = cells.shape
+    new_columns, new_rows = columns + before[0] + after[0], rows + before[1] + after[1]
     if max(new_columns, new_rows) > most:
         return None
     grown = np.full((new_rows, new_columns), fill, dtype=cells.dtype)
     grown[before[1] : before[1] + rows, before[0] : before[0] + columns] = cells
     moved = frame.copy()
-    moved[:2] -= before / per_metre
+    moved[:2] -= np.array(before) / per_metre
     return grown, moved

@@ -65,7 +65,7 @@ class Raster:
         smooth = self.frame[3] > 1
         reach = FIELD_REACH * self.half_side if smooth else self.half_side
         left, bottom, right, top = bounds(segments)
-        low, high = np.array([left, bottom]) - reach, np.array([right, top]) + reach
+        low, high = (left - reach, bottom - reach), (right + reach, top + reach)
         room = make_room(self.cells, self.frame, low, high, 0, MAXIMUM_CELLS_PER_SIDE)
         if room is None:
             return None

@@ -86,8 +86,8 @@ class Surface:
         segments = np.concatenate((self.segments, added))
         pieces, tilts = np.concatenate((self.pieces, pieces)), np.concatenate((self.tilts, tilts))
         left, bottom, right, top = bounds(added)
-        low = np.array([left, bottom]) - REACH
-        high = np.array([right, top]) + REACH + LANES / self.frame[2]
+        low, margin = (left - REACH, bottom - REACH), REACH + LANES / float(self.frame[2])
+        high = (right + margin, top + margin)
         room = None
         if len(self.segments) > 0 and len(segments) < 2 ** int(self.frame[3]):
             room = make_room(self.nearest, self.frame, low, high, int(EMPTY), MAXIMUM_CELLS_PER_SIDE)

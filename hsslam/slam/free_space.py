@@ -32,8 +32,9 @@ class FreeSpace:
 
     def add(self, points: Points, laser: Pose, pose: Pose) -> None:
         """Add a keyframe at ``pose``: (N, 2) points in the order of the beams, and the laser, in the robot's frame."""
-        middle = compose(pose, laser)[:2]
-        room = make_room(self._cells, self._frame, middle - FARTHEST, middle + FARTHEST, 0, MOST_CELLS)
+        x, y, _ = compose(pose, laser).tolist()
+        low, high = (x - FARTHEST, y - FARTHEST), (x + FARTHEST, y + FARTHEST)
+        room = make_room(self._cells, self._frame, low, high, 0, MOST_CELLS)
         if room is not None:
             self._cells, self._frame = room
             mark(self._cells, self._frame, points, laser, pose)

@@ -28,7 +28,8 @@ _EVENTS: dict[str, type[Event]] = {
     "loop": LoopChecked,
     "optimised": Optimised,
 }
-_NAMES = {kind: name for name, kind in _EVENTS.items()}
+_NAMES = {kind: (name, [item.name for item in fields(kind)]) for name, kind in _EVENTS.items()}
+"""What a kind of event is called, and what is written of it."""
 
 
 @dataclass(frozen=True)
@@ -139,8 +140,8 @@ class Journal:
     def write(self, event: Event) -> None:
         """Append an event."""
         if not self._replay.holds(event):
-            values = {item.name: getattr(event, item.name) for item in fields(event)}
-            self._line({"event": _NAMES[type(event)], **values})
+            name, attributes = _NAMES[type(event)]
+            self._line({"event": name, **{key: getattr(event, key) for key in attributes}})
 
     def close(self) -> None:
         """Close the file."""
@@ -155,7 +156,7 @@ class Journal:
         self.close()
 
     def _line(self, values: Mapping[str, Any]) -> None:
-        self._file.write(json.dumps(values, default=_plain) + "\n")
+        self._file.write(_ENCODER.encode(values) + "\n")
         self._file.flush()
 
 
@@ -238,3 +239,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} has no place in a journal")
+
+
+_ENCODER = json.JSONEncoder(default=_plain)
