@@ -218,7 +218,7 @@ class GraphSection(Section):
     threads: int = Field(
         default=0,
         ge=0,
-        description="threads that match side by side at the end, with hide, hsl and glasm; what they find does not "
+        description="threads that match side by side at the end, where the matcher can; what they find does not "
         "depend on it (0: one for each core, 4 at most)",
     )
 

@@ -34,7 +34,7 @@ def environment() -> dict[str, Any]:
         "packages": _versions(),
         "plugins": _plugins(),
         "cpu": cpu_model(),
-        "cores": _cores(),
+        "cores": cores(),
         "system": f"{platform.system()} {platform.release()}",
         "machine": platform.machine(),
     }
@@ -55,7 +55,8 @@ def cpu_model() -> str:
     return next(names, platform.machine())
 
 
-def _cores() -> int:
+def cores() -> int:
+    """How many cores this process may use."""
     if sys.platform == "linux":
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

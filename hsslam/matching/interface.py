@@ -151,7 +151,7 @@ class Matcher(ABC, Generic[ConfigT]):
     is local or its effort fixed, a wide window is searched in tiles, each of them a match."""
 
     side_by_side: ClassVar[bool] = False
-    """Whether `match_many` works without the interpreter lock: on two cores, two threads then match twice as much."""
+    """Whether `match_many` works mostly without the interpreter lock, so that two threads match more than one."""
 
     def __init__(self, config: ConfigT | None = None) -> None:
         self.check_available()

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
+from hsslam.environment import cores
 from hsslam.matching.interface import Matcher
 
 PartT = TypeVar("PartT")
@@ -26,7 +26,7 @@ def threads_for(matcher: Matcher[Any], wanted: int) -> int:
     """
     if not matcher.side_by_side:
         return 1
-    return wanted or min(_cores(), MOST)
+    return wanted or min(cores(), MOST)
 
 
 def side_by_side(work: Callable[[int], PartT], count: int, threads: int) -> list[PartT]:
@@ -56,10 +56,3 @@ def side_by_side(work: Callable[[int], PartT], count: int, threads: int) -> list
     for helper in helpers:
         helper.result()
     return [part for begin in sorted(done) for part in done[begin]]
-
-
-def _cores() -> int:
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # only Linux tells which cores a process may use
-        return os.cpu_count() or 1

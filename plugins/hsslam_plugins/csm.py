@@ -46,6 +46,7 @@ class Csm(Matcher[CsmConfig]):
 
     Config = CsmConfig
     summary = "correlative scan matching on a likelihood field (Olson 2009)"
+    side_by_side = True
     covers_window = True
 
     def prepare(self, points: Points) -> ExhaustiveReference:

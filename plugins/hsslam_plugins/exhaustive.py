@@ -46,6 +46,7 @@ class Exhaustive(Matcher[ExhaustiveConfig]):
 
     Config = ExhaustiveConfig
     summary = "branch and bound: the proven best pose of the window (Olson 2009; Hess et al. 2016)"
+    side_by_side = True
     covers_window = True
 
     def prepare(self, points: Points) -> ExhaustiveReference:

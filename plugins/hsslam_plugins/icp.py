@@ -82,6 +82,7 @@ class Icp(Matcher[IcpConfig]):
 
     Config = IcpConfig
     summary = "point-to-line ICP, robust, coarse to fine (Open3D)"
+    side_by_side = True
 
     @classmethod
     def check_available(cls) -> None:
