@@ -45,6 +45,12 @@ LEAP_GAIN = 0.06
 IMPOSSIBLE = 1.0
 """By none at all, where odometry leaps further than this (m + rad) from where the robot was going."""
 
+FARTHER = 3.0
+"""How many times the first answer's standard deviation an answer at a bottom of its own may have."""
+
+AT_REST = 0.01
+"""Standard deviation (m, rad) that any answer may have."""
+
 STEADY = 2.0
 """This many times as much where odometry goes on as the robot went, and the answer does not: robots do not leap."""
 
@@ -205,6 +211,9 @@ class Locator:
         near = self._match(expected.pose, expected.window(AGREEING, self._window))
         if not near.converged or near.score <= first.score - expected.least_gain(first.pose):
             return first
+        if not _at_rest(near, first):
+            # What it is drawn to lies beyond the window: the first answer, or else another one.
+            return first if near.score <= first.score else self._settled(near)
         # What so narrow a window adds to the covariance is odometry's, and odometry is weighed by itself.
         return self._known_within(self._window, near)
 
@@ -254,6 +263,15 @@ def _cut_off(result: MatchResult, expected: Expectation, window: SearchWindow) -
         along = np.array([math.cos(direction), math.sin(direction), 0.0])
         off -= (off @ along) * along
     return at_edge(off, window)
+
+
+def _at_rest(near: MatchResult, first: MatchResult) -> bool:
+    """Whether an answer in a narrow window stands at a bottom, not where the window ends on the way to another.
+
+    The step that leads to the bottom is part of a covariance: beyond it the first answer is `FARTHER` surer.
+    """
+    deviations, sure = (np.sqrt(np.diag(result.covariance)) for result in (near, first))
+    return bool(np.all(deviations <= np.maximum(FARTHER * sure, AT_REST)))
 
 
 def _contradicts(result: MatchResult, expected: Expectation) -> bool:
