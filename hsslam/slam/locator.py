@@ -42,10 +42,13 @@ RECOVERY_GAIN = 0.12
 LEAP_GAIN = 0.06
 """By this much, where odometry leaps and the answer goes on as the robot went."""
 
+UNLIKE = 0.1
+"""Odometry's motion is unlike the last one where it leads this far (m + rad) from where that leads."""
+
 IMPOSSIBLE = 1.0
 """By none at all, where odometry leaps further than this (m + rad) from where the robot was going."""
 
-FARTHER = 3.0
+FARTHER = 7.0
 """How many times the first answer's standard deviation an answer at a bottom of its own may have."""
 
 AT_REST = 0.01
@@ -86,6 +89,10 @@ class Expectation:
         """As far as the truth may be from the expected pose, between two other windows."""
         variances = self.covariance
         return foreseen_window(max(variances[0, 0], variances[1, 1]), variances[2, 2], least, most)
+
+    def belies(self, found: MatchResult) -> bool:
+        """Whether an answer fits less than usual, and the robot did not go on: a message of odometry may be late."""
+        return found.score < self.score - USUAL and way(self.pose, self.repeated) > UNLIKE
 
     def least_gain(self, found: Pose) -> float:
         """By how much an answer must score higher to overrule odometry: it matters which goes on as the robot went."""
@@ -155,7 +162,7 @@ class Locator:
         if self._doubtful(found):
             with self._stopwatch.measure("recover"):
                 found = self._recover(expected, found)
-        elif expected.leaps and found.score < 1.0:
+        elif found.score < 1.0 and (expected.leaps or expected.belies(found)):
             with self._stopwatch.measure("recover"):
                 found = self._steadier(expected, found)
         if "degenerate_direction" in found.diagnostics:

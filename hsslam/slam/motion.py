@@ -21,6 +21,9 @@ MOVING = 0.02
 LEAP = 0.2
 """Odometry leaps when its motion from one scan to the next differs by more than this from the one before (m + rad)."""
 
+UNSTEADY = 0.3
+"""Share of the change of odometry's motion, from one scan to the next, that may be its error (standard deviation)."""
+
 FADING = 0.8
 """Share of a motion that is left a scan later where neither odometry nor a match tells of it."""
 
@@ -85,7 +88,7 @@ class MotionModel:
         """Motion since the last scan, in its frame, and the motion's covariance (3, 3)."""
         if not self.silent:
             moved = between(self._odometry, scan.odometry)
-            return moved, self.covariance(moved)
+            return moved, self.covariance(moved) + self._unsteady(moved)
         moved = self._last_motion * self._stretch(scan.stamp)
         return moved, self.covariance(moved) + np.diag([0.05**2, 0.05**2, math.radians(3.0) ** 2])
 
@@ -127,6 +130,12 @@ class MotionModel:
         out[0, 0] = out[1, 1] = xy
         out[2, 2] = theta
         return out
+
+    def _unsteady(self, moved: Pose) -> NDArray[np.float64]:
+        """What a motion unlike the last adds to its covariance (3, 3): messages of odometry come late, and wheels slip."""
+        change = moved - self._last_step
+        xy = (UNSTEADY * math.hypot(change[0], change[1])) ** 2
+        return np.diag([xy, xy, (UNSTEADY * wrap(change[2])) ** 2])
 
     def _stretch(self, stamp: float) -> float:
         """Time since the last scan over the time before it; 1 where stamps are no help."""
