@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import room_scan_at
 from numpy.typing import NDArray
 
 from hsslam.config import TrackerSection
@@ -118,3 +119,44 @@ def test_what_did_not_come_to_rest_gives_way_only_to_what_fits_better(
     found = locator_in(known, matcher).locate(expected)
     assert found.pose == pytest.approx(STEADY if stays else elsewhere)
     assert found.converged is believed
+
+
+class Drawn(OneOfTwo):
+    """In a window that reaches it, the pose that odometry denies; in a narrow one, a place on the way there."""
+
+    on_the_way: Pose
+
+    def estimate(
+        self,
+        reference: Reference,
+        points: Points,
+        guess: Pose,
+        window: SearchWindow,
+        rng: np.random.Generator,
+    ) -> Estimate:
+        far = bool((np.abs(self.leapt - guess) > window.half).any())
+        return Estimate((self.on_the_way if far else self.leapt).copy())
+
+
+@pytest.mark.parametrize("rests", [False, True], ids=["drawn", "at rest"])
+def test_an_answer_near_odometry_has_to_stand_at_a_bottom(rests: bool) -> None:
+    """A room's walls, seen from where odometry is 12 cm off; and from where walls fit there as well."""
+    walls = room_scan_at(np.zeros(3), beams=360, noise=0.002).points
+    matcher = Drawn()
+    matcher.leapt, matcher.on_the_way = pose(0.12, 0.0, 0.0), pose(0.035, 0.0, 0.0)
+    expected = Expectation(
+        pose=np.zeros(3),
+        covariance=np.diag([0.01, 0.01, 0.01]) ** 2,
+        repeated=np.zeros(3),
+        told=True,
+        leaps=False,
+        score=0.9,
+    )
+    known = transform(matcher.leapt, walls)
+    if rests:
+        known = np.concatenate((known, transform(matcher.on_the_way, walls)))
+    submap = GrowingSubmap(matcher, known, np.zeros(3))
+    found = Locator(TrackerSection(), matcher, submap, walls, np.random.default_rng(0), Stopwatch()).locate(
+        expected
+    )
+    assert found.pose == pytest.approx(matcher.on_the_way if rests else matcher.leapt)

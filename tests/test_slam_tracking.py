@@ -12,10 +12,10 @@ from conftest import room_scan_at
 from numpy.typing import NDArray
 
 from hsslam.config import load_config
-from hsslam.datasets.simulator import raycast
+from hsslam.datasets.simulator import SimulatedDataset, raycast
 from hsslam.matching.interface import SearchWindow
 from hsslam.scan import LaserScan, ScanGeometry
-from hsslam.se2 import pose
+from hsslam.se2 import between_many, interpolate, pose
 from hsslam.slam.events import Tracked
 from hsslam.slam.pipeline import Slam
 from hsslam.slam.windows import foreseen_window
@@ -152,3 +152,36 @@ def test_odometry_that_leaps_is_not_followed_to_where_less_fits(slip: float) -> 
         (event, *_) = slam.process(LaserScan(float(i), ranges, geometry, truth + slipped, index=i))
         assert isinstance(event, Tracked)
         assert event.pose == pytest.approx(truth, abs=0.1), f"scan {i}"
+
+
+@pytest.mark.parametrize("world", ["office", "hall"])
+def test_odometry_that_comes_late_holds_no_scan_back(world: str) -> None:
+    """Every eighth message tells of a tenth of the motion, and the next of the rest: half a metre in all."""
+    log = SimulatedDataset(world, seed=2, scans=240)
+    scans, truth = list(log.scans())[::3], log.poses[::3]
+    late = [
+        interpolate(scans[i - 1].odometry, scan.odometry, 0.1) if i % 8 == 4 else scan.odometry
+        for i, scan in enumerate(scans)
+    ]
+    slam = Slam(load_config())
+    for i, (scan, odometry) in enumerate(zip(scans, late, strict=True)):
+        slam.process(replace(scan, odometry=odometry, index=i))
+    online = slam.result().online.poses
+    off = between_many(between_many(truth[:-1], truth[1:]), between_many(online[:-1], online[1:]))
+    # Four scans in the office were up to 0.4 m behind.
+    assert np.hypot(*off[:, :2].T).max() < 0.05
+
+
+def test_a_robot_in_a_bare_corridor_goes_where_odometry_leaps_to() -> None:
+    """A jump of odometry is doubtful, but of the way along the corridor the returns tell nothing at all."""
+    walls = np.array([[-60.0, -1.2, 60.0, -1.2], [-60.0, 1.2, 60.0, 1.2]])
+    geometry = ScanGeometry(-math.pi / 2, math.radians(1.0), range_max=12.0)
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        slam = Slam(load_config(overrides=[f"seed={seed}"]))
+        for i in range(12):
+            odometry = pose(0.1 * i + (0.9 if i >= 6 else 0.0), 0.0, 0.0)
+            ranges = raycast(walls, odometry, geometry, 180) + 0.01 * rng.standard_normal(180)
+            (event, *_) = slam.process(LaserScan(float(i), ranges, geometry, odometry, index=i))
+            assert isinstance(event, Tracked)
+        assert event.pose[0] == pytest.approx(odometry[0], abs=0.1)

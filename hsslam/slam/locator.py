@@ -10,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import TrackerSection
+from hsslam.kernels.assess import assess
 from hsslam.matching.interface import MINIMUM_POINTS, Matcher, SearchWindow
 from hsslam.matching.results import MatchResult
 from hsslam.se2 import Points, Pose
+from hsslam.search.polish import scan_lines
+from hsslam.search.slide import weak_direction
 from hsslam.slam.fusion import GATE, squared_mahalanobis
 from hsslam.slam.motion import way
 from hsslam.slam.stopwatch import Stopwatch
@@ -41,6 +44,9 @@ RECOVERY_GAIN = 0.12
 
 LEAP_GAIN = 0.06
 """By this much, where odometry leaps and the answer goes on as the robot went."""
+
+OPEN_STD = 10.0
+"""Standard deviation (m) along a direction of which the returns tell nothing."""
 
 UNLIKE = 0.1
 """Odometry's motion is unlike the last one where it leads this far (m + rad) from where that leads."""
@@ -150,7 +156,7 @@ class Locator:
         self._enough = max(expected.score - USUAL, self._rules.recovery_score)
         with self._stopwatch.measure("track"):
             found = self._match(expected.pose, window)
-            cut_off = _cut_off(found, expected, window)
+            cut_off = _cut_off(found, expected, window, self._open_direction(found))
             if not (cut_off or expected.leaps):
                 found = self._without_passers_by(expected, window, found)
         if cut_off:
@@ -165,9 +171,8 @@ class Locator:
         elif found.score < 1.0 and (expected.leaps or expected.belies(found)):
             with self._stopwatch.measure("recover"):
                 found = self._steadier(expected, found)
-        if "degenerate_direction" in found.diagnostics:
-            # How far the window reaches along it is no news: that, too, is odometry's.
-            found = self._known_within(self._widest, found)
+        if self._open_direction(found) is not None:
+            found = self._left_open(found)
         return replace(found, evaluations=self._evaluations)
 
     def _match(self, guess: Pose, window: SearchWindow) -> MatchResult:
@@ -240,6 +245,35 @@ class Locator:
             return self._settled(best)
         return first
 
+    def _open_direction(self, found: MatchResult) -> float | None:
+        """The direction (rad) that an answer leaves open, if any.
+
+        The scan's own lines have to leave one open, too: away from the bottom of its distances, where a method that
+        counts hits stops, that of a room may seem to.
+        """
+        direction: float | None = found.diagnostics.get("degenerate_direction")
+        if direction is None or math.isnan(weak_direction(scan_lines(self._points))):
+            return None
+        return direction
+
+    def _left_open(self, found: MatchResult) -> MatchResult:
+        """An answer that leaves a direction open, with what is known of it in the widest window.
+
+        How far a window reaches is no news. What is open there, too, is left to odometry altogether, however
+        little that is worth: the answer's place along a bare corridor is anywhere in the window.
+        """
+        _, covariance, direction = assess(
+            self._reference.surface,
+            self._points,
+            found.pose,
+            self._widest.half,
+            self._matcher.config.score_distance,
+        )
+        if not math.isnan(direction):
+            along = np.array([math.cos(direction), math.sin(direction), 0.0])
+            covariance += OPEN_STD**2 * np.outer(along, along)
+        return replace(found, covariance=covariance)
+
     def _settled(self, found: MatchResult) -> MatchResult:
         """Search on around what was found far off: the wide window, too, may have cut it off."""
         for _ in range(SETTLINGS):
@@ -261,10 +295,14 @@ def _better(other: MatchResult, first: MatchResult, gain: float) -> bool:
     return other.converged and other.score > first.score + (gain if first.converged else 0.0)
 
 
-def _cut_off(result: MatchResult, expected: Expectation, window: SearchWindow) -> bool:
-    """Whether a better answer may lie beyond the edge of the window around the expected pose."""
+def _cut_off(
+    result: MatchResult, expected: Expectation, window: SearchWindow, direction: float | None
+) -> bool:
+    """Whether a better answer may lie beyond the edge of the window around the expected pose.
+
+    ``direction`` (rad) is what the answer leaves open, if anything.
+    """
     off = difference(result.pose, expected.pose)
-    direction = result.diagnostics.get("degenerate_direction")
     if expected.told and direction is not None and result.score >= expected.score - USUAL:
         # All places along it are as good, those at the edge too: a bare wall's are, if the scan fits as ever.
         along = np.array([math.cos(direction), math.sin(direction), 0.0])

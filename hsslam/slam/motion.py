@@ -132,7 +132,7 @@ class MotionModel:
         return out
 
     def _unsteady(self, moved: Pose) -> NDArray[np.float64]:
-        """What a motion unlike the last adds to its covariance (3, 3): messages of odometry come late, and wheels slip."""
+        """What a motion unlike the last adds to its covariance (3, 3): messages come late, and wheels slip."""
         change = moved - self._last_step
         xy = (UNSTEADY * math.hypot(change[0], change[1])) ** 2
         return np.diag([xy, xy, (UNSTEADY * wrap(change[2])) ** 2])
