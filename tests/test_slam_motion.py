@@ -14,7 +14,7 @@ from hsslam.config import Config, GraphSection, load_config
 from hsslam.datasets.simulator import SimulatedDataset
 from hsslam.scan import LaserScan, ScanGeometry
 from hsslam.se2 import between_many, compose, pose
-from hsslam.slam.motion import REST_STD_XY, MotionModel
+from hsslam.slam.motion import REST_STD_THETA, REST_STD_XY, UNSTEADY, MotionModel
 from hsslam.slam.pipeline import Slam
 
 RULES = GraphSection()
@@ -40,8 +40,17 @@ def test_odometry_is_the_prediction_in_the_frame_of_the_last_scan() -> None:
     moved, covariance = model.predict(scan(0.1, compose(start, step)))
     assert moved == pytest.approx(step)
     travel = math.hypot(0.4, 0.1) + 0.2
-    assert covariance[0, 0] == pytest.approx((RULES.odometry_std_xy * travel) ** 2 + REST_STD_XY**2)
+    usual = (RULES.odometry_std_xy * travel) ** 2 + REST_STD_XY**2
+    # A run begins at rest.
+    assert covariance[0, 0] == pytest.approx(usual + (UNSTEADY * math.hypot(0.4, 0.1)) ** 2)
     assert np.linalg.eigvalsh(covariance)[0] > 0.0
+    going = compose(start, step)
+    model.observe(scan(0.1, going), step, matched=True)
+    _, steady = model.predict(scan(0.2, compose(going, step)))
+    assert steady[0, 0] == pytest.approx(usual)
+    _, late = model.predict(scan(0.2, going))
+    assert late[0, 0] == pytest.approx(REST_STD_XY**2 + (UNSTEADY * math.hypot(0.4, 0.1)) ** 2)
+    assert late[2, 2] == pytest.approx(REST_STD_THETA**2 + (UNSTEADY * 0.2) ** 2)
 
 
 def test_a_robot_at_rest_is_not_an_outage() -> None:
