@@ -172,7 +172,7 @@ class Locator:
             with self._stopwatch.measure("recover"):
                 found = self._steadier(expected, found)
         if self._open_direction(found) is not None:
-            found = self._left_open(found)
+            found = self._left_open(expected, found)
         return replace(found, evaluations=self._evaluations)
 
     def _match(self, guess: Pose, window: SearchWindow) -> MatchResult:
@@ -256,11 +256,11 @@ class Locator:
             return None
         return direction
 
-    def _left_open(self, found: MatchResult) -> MatchResult:
+    def _left_open(self, expected: Expectation, found: MatchResult) -> MatchResult:
         """An answer that leaves a direction open, with what is known of it in the widest window.
 
-        How far a window reaches is no news. What is open there, too, is left to odometry altogether, however
-        little that is worth: the answer's place along a bare corridor is anywhere in the window.
+        How far a window reaches is no news. What is open there, too, is left to odometry altogether, if it tells,
+        however little that is worth: the answer's place along a bare corridor is anywhere in the window.
         """
         _, covariance, direction = assess(
             self._reference.surface,
@@ -269,7 +269,7 @@ class Locator:
             self._widest.half,
             self._matcher.config.score_distance,
         )
-        if not math.isnan(direction):
+        if expected.told and not math.isnan(direction):
             along = np.array([math.cos(direction), math.sin(direction), 0.0])
             covariance += OPEN_STD**2 * np.outer(along, along)
         return replace(found, covariance=covariance)
