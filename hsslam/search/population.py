@@ -98,8 +98,6 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
     A subclass writes `search`; a config of its own extends `PopulationConfig`.
     """
 
-    side_by_side = True
-
     def prepare(self, points: Points) -> PopulationReference:
         """Rasterise a reference; see `hsslam.matching.Matcher.prepare`."""
         return PopulationReference(clean(points), self.config)

@@ -58,6 +58,7 @@ class Glasm(PopulationMatcher[GlasmConfig]):
 
     Config = GlasmConfig
     summary = "genetic search, Gray-coded (Lenac, Mumolo, Nolich 2007)"
+    side_by_side = True
 
     def search(
         self,

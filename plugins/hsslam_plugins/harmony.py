@@ -107,6 +107,7 @@ class HarmonyMatcher(PopulationMatcher[HarmonyConfigT], Generic[HarmonyConfigT])
     """Base of HSL and HIDE: how much effort a window is worth."""
 
     covers_window = True
+    side_by_side = True
 
     @property
     @abstractmethod
