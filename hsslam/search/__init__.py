@@ -1,9 +1,8 @@
 """Population searches over a box around a guess: harmony search, differential evolution, HIDE, genetic."""
 
-from hsslam.kernels.random import seed_of, seeds_of
+from hsslam.kernels.random import seed_of
 from hsslam.kernels.raster import Raster
 from hsslam.kernels.surface import Surface
-from hsslam.search.batch import Batch
 from hsslam.search.fitness import HitFitness
 from hsslam.search.fitness_functions import FitnessFunction, fitness_names, register_fitness
 from hsslam.search.genetic import genetic_search, genetic_search_all
@@ -12,6 +11,7 @@ from hsslam.search.hide import hide_search, hide_search_all
 from hsslam.search.minimize import minimize
 from hsslam.search.population import (
     NO_TRACE,
+    KernelMatcher,
     PopulationConfig,
     PopulationMatcher,
     PopulationReference,
@@ -19,9 +19,9 @@ from hsslam.search.population import (
 
 __all__ = [
     "NO_TRACE",
-    "Batch",
     "FitnessFunction",
     "HitFitness",
+    "KernelMatcher",
     "PopulationConfig",
     "PopulationMatcher",
     "PopulationReference",
@@ -37,5 +37,4 @@ __all__ = [
     "minimize",
     "register_fitness",
     "seed_of",
-    "seeds_of",
 ]

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from hsslam.kernels.random import seed_of, seeds_of
 from hsslam.kernels.raster import Raster
 from hsslam.kernels.surface import Surface
 from hsslam.matching.interface import MINIMUM_POINTS, Matcher, MatcherConfig, Reference, SearchWindow, clean
@@ -220,3 +221,61 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
             0.0 if wide else self.config.half_side,
         )
         return Estimate(pose, evaluations=evaluations + looked, diagnostics=diagnostics)
+
+
+class KernelMatcher(PopulationMatcher[PopulationConfigT], Generic[PopulationConfigT]):
+    """Base of matchers whose search is a kernel, of one scan or of a batch.
+
+    A subclass names the two kernels, which begin and end alike: see `hsslam.search.harmony.harmony_search` and
+    `harmony_search_all`. What is between window and seed is theirs, and comes from `settings`.
+    """
+
+    side_by_side = True
+    kernel: ClassVar[Callable[..., tuple[Pose, int, int]]]
+    kernel_all: ClassVar[Callable[..., tuple[Poses, NDArray[np.int64]]]]
+
+    @abstractmethod
+    def settings(self, window: SearchWindow) -> tuple[Any, ...]:
+        """What the kernels are told of a search in a window."""
+
+    def search(
+        self,
+        fitness: HitFitness,
+        guess: Pose,
+        window: SearchWindow,
+        rng: np.random.Generator,
+        trace: NDArray[np.float64] = NO_TRACE,
+    ) -> tuple[Pose, int, int]:
+        """See `PopulationMatcher.search`."""
+        return self.kernel(
+            fitness.cells,
+            fitness.frame,
+            fitness.scaled,
+            fitness.count,
+            guess,
+            window.half,
+            *self.settings(window),
+            seed_of(rng),
+            trace,
+        )
+
+    def search_all(
+        self,
+        raster: Raster,
+        batch: Batch,
+        most: int,
+        window: SearchWindow,
+        rng: np.random.Generator,
+    ) -> tuple[Poses, NDArray[np.int64]]:
+        """See `PopulationMatcher.search_all`."""
+        return self.kernel_all(
+            raster.cells,
+            raster.frame,
+            batch.points,
+            batch.ends,
+            batch.guesses,
+            most,
+            window.half,
+            *self.settings(window),
+            seeds_of(rng, len(batch)),
+        )

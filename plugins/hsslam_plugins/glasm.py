@@ -2,23 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from hsslam.matching import Pose, Poses, SearchWindow
-from hsslam.search import (
-    NO_TRACE,
-    Batch,
-    HitFitness,
-    PopulationConfig,
-    PopulationMatcher,
-    Raster,
-    genetic_search,
-    genetic_search_all,
-    seed_of,
-    seeds_of,
-)
+from hsslam.matching import SearchWindow
+from hsslam.search import KernelMatcher, PopulationConfig, genetic_search, genetic_search_all
 from hsslam.search.fitness import FitnessName
 
 
@@ -53,57 +40,15 @@ class GlasmConfig(PopulationConfig):
     )
 
 
-class Glasm(PopulationMatcher[GlasmConfig]):
+class Glasm(KernelMatcher[GlasmConfig]):
     """Genetic search over the window, poses as Gray-coded bits."""
 
     Config = GlasmConfig
     summary = "genetic search, Gray-coded (Lenac, Mumolo, Nolich 2007)"
-    side_by_side = True
+    kernel = staticmethod(genetic_search)
+    kernel_all = staticmethod(genetic_search_all)
 
-    def search(
-        self,
-        fitness: HitFitness,
-        guess: Pose,
-        window: SearchWindow,
-        rng: np.random.Generator,
-        trace: NDArray[np.float64] = NO_TRACE,
-    ) -> tuple[Pose, int, int]:
-        """See `hsslam.search.genetic_search`."""
-        return genetic_search(
-            fitness.cells,
-            fitness.frame,
-            fitness.scaled,
-            fitness.count,
-            guess,
-            window.half,
-            *self._settings,
-            seed_of(rng),
-            trace,
-        )
-
-    def search_all(
-        self,
-        raster: Raster,
-        batch: Batch,
-        most: int,
-        window: SearchWindow,
-        rng: np.random.Generator,
-    ) -> tuple[Poses, NDArray[np.int64]]:
-        """See `hsslam.search.genetic_search_all`."""
-        return genetic_search_all(
-            raster.cells,
-            raster.frame,
-            batch.points,
-            batch.ends,
-            batch.guesses,
-            most,
-            window.half,
-            *self._settings,
-            seeds_of(rng, len(batch)),
-        )
-
-    @property
-    def _settings(self) -> tuple[int, int, int, float, float, int]:
+    def settings(self, window: SearchWindow) -> tuple[int, int, int, float, float, int]:
         """What `genetic_search` is told of the search."""
         config = self.config
         return (

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from hsslam.matching import SearchWindow
-from hsslam.search import PopulationConfig, PopulationMatcher
+from hsslam.search import KernelMatcher, PopulationConfig
 
 
 class HarmonyConfig(PopulationConfig):
@@ -103,11 +103,10 @@ HarmonySettings: TypeAlias = tuple[
 HarmonyConfigT = TypeVar("HarmonyConfigT", bound=HarmonyConfig)
 
 
-class HarmonyMatcher(PopulationMatcher[HarmonyConfigT], Generic[HarmonyConfigT]):
+class HarmonyMatcher(KernelMatcher[HarmonyConfigT], Generic[HarmonyConfigT]):
     """Base of HSL and HIDE: how much effort a window is worth."""
 
     covers_window = True
-    side_by_side = True
 
     @property
     @abstractmethod

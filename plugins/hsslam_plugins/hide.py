@@ -2,21 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from hsslam.matching import Pose, Poses, SearchWindow
-from hsslam.search import (
-    NO_TRACE,
-    Batch,
-    HitFitness,
-    Raster,
-    hide_search,
-    hide_search_all,
-    seed_of,
-    seeds_of,
-)
+from hsslam.matching import SearchWindow
+from hsslam.search import hide_search, hide_search_all
 from hsslam_plugins.harmony import HarmonyConfig, HarmonyMatcher, HarmonySettings
 
 WIDE_WEIGHT = 0.8
@@ -51,55 +40,15 @@ class Hide(HarmonyMatcher[HideConfig]):
 
     Config = HideConfig
     summary = "harmony search improved by differential evolution (paper, section 5)"
+    kernel = staticmethod(hide_search)
+    kernel_all = staticmethod(hide_search_all)
 
     @property
     def budget(self) -> int:
         """See `HideConfig.evaluations`."""
         return self.config.evaluations
 
-    def search(
-        self,
-        fitness: HitFitness,
-        guess: Pose,
-        window: SearchWindow,
-        rng: np.random.Generator,
-        trace: NDArray[np.float64] = NO_TRACE,
-    ) -> tuple[Pose, int, int]:
-        """See `hsslam.search.hide_search`."""
-        return hide_search(
-            fitness.cells,
-            fitness.frame,
-            fitness.scaled,
-            fitness.count,
-            guess,
-            window.half,
-            *self._settings(window),
-            seed_of(rng),
-            trace,
-        )
-
-    def search_all(
-        self,
-        raster: Raster,
-        batch: Batch,
-        most: int,
-        window: SearchWindow,
-        rng: np.random.Generator,
-    ) -> tuple[Poses, NDArray[np.int64]]:
-        """See `hsslam.search.hide_search_all`."""
-        return hide_search_all(
-            raster.cells,
-            raster.frame,
-            batch.points,
-            batch.ends,
-            batch.guesses,
-            most,
-            window.half,
-            *self._settings(window),
-            seeds_of(rng, len(batch)),
-        )
-
-    def _settings(self, window: SearchWindow) -> tuple[*HarmonySettings, int, float, float, float, int]:
+    def settings(self, window: SearchWindow) -> tuple[*HarmonySettings, int, float, float, float, int]:
         """What `hide_search` is told of the search."""
         config = self.config
         return (
