@@ -230,7 +230,7 @@ class Locator:
         return self._known_within(self._window, near)
 
     def _steadier(self, expected: Expectation, first: MatchResult) -> MatchResult:
-        """Where odometry leaps, try the last motion once more: a jump may reach further than any window."""
+        """Where odometry leaps or is late, try the last motion once more: that may reach further than any window."""
         best = self._match(expected.repeated, self._window)
         gain = LEAP_GAIN if way(expected.pose, expected.repeated) < IMPOSSIBLE else 0.0
         better = best.converged and best.score > first.score + gain
