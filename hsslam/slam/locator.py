@@ -45,6 +45,9 @@ RECOVERY_GAIN = 0.12
 LEAP_GAIN = 0.06
 """By this much, where odometry leaps and the answer goes on as the robot went."""
 
+DOUBTFUL = 0.1
+"""Odometry is doubtful along an open direction where its variance is more than this share of the answer's."""
+
 OPEN_STD = 10.0
 """Standard deviation (m) along a direction of which the returns tell nothing."""
 
@@ -259,8 +262,8 @@ class Locator:
     def _left_open(self, expected: Expectation, found: MatchResult) -> MatchResult:
         """An answer that leaves a direction open, with what is known of it in the widest window.
 
-        How far a window reaches is no news. What is open there, too, is left to odometry altogether, if it tells,
-        however little that is worth: the answer's place along a bare corridor is anywhere in the window.
+        How far a window reaches is no news. What is open there, too, is left to odometry altogether, the more so the
+        more doubtful that is: the answer's place along a bare corridor is anywhere in the window, and would have a say.
         """
         _, covariance, direction = assess(
             self._reference.surface,
@@ -271,7 +274,8 @@ class Locator:
         )
         if expected.told and not math.isnan(direction):
             along = np.array([math.cos(direction), math.sin(direction), 0.0])
-            covariance += OPEN_STD**2 * np.outer(along, along)
+            if along @ expected.covariance @ along > DOUBTFUL * (along @ covariance @ along):
+                covariance += OPEN_STD**2 * np.outer(along, along)
         return replace(found, covariance=covariance)
 
     def _settled(self, found: MatchResult) -> MatchResult:
