@@ -25,6 +25,7 @@ from hsslam.kernels.free_space import (
     by_things,
     in_free_space,
     mark,
+    unseen,
 )
 from hsslam.se2 import compose, pose, transform
 
@@ -99,6 +100,32 @@ def test_marks_are_those_of_the_twin(
         mark_twin(expected, points, laser, place)
     # A place on the border of two cells may fall on either side.
     assert np.count_nonzero(cells != expected) <= 2
+
+
+def unseen_twin(
+    cells: NDArray[np.uint8], points: NDArray[np.float64], place: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    known = np.pad(cells, 100) > 0
+    rows, columns = cells_of(transform(place, points))
+    around = [known[100 + rows + r, 100 + columns + c] for r in (-1, 0, 1) for c in (-1, 0, 1)]
+    return ~np.any(around, axis=0)
+
+
+@given(clouds, places, clouds, places)
+@settings(deadline=None, max_examples=60)
+def test_what_was_never_seen_is_that_of_the_twin(
+    seen: NDArray[np.float64],
+    place: NDArray[np.float64],
+    points: NDArray[np.float64],
+    elsewhere: NDArray[np.float64],
+) -> None:
+    cells = empty()
+    mark(cells, FRAME, seen, HERE, place)
+    # Some of the points are near the raster's border, and beyond.
+    points = 2.5 * points
+    np.testing.assert_array_equal(
+        unseen(cells, FRAME, points, elsewhere), unseen_twin(cells, points, elsewhere)
+    )
 
 
 @given(st.integers(0, 10_000))

@@ -135,6 +135,28 @@ def in_free_space(
 
 
 @kernel
+def unseen(
+    cells: NDArray[np.uint8], frame: NDArray[np.float64], points: Points, pose: Pose
+) -> NDArray[np.bool_]:
+    """Which of a scan's points (N, 2), seen from a pose, lie where no beam went or ended, (N,).
+
+    Nor in any of the eight cells around. Parameters as those of `mark`.
+    """
+    rows, columns = cells.shape
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    new = np.ones(points.shape[0], dtype=np.bool_)
+    for i in range(points.shape[0]):
+        x = (pose[0] + c * points[i, 0] - s * points[i, 1] - frame[0]) * frame[2]
+        y = (pose[1] + s * points[i, 0] + c * points[i, 1] - frame[1]) * frame[2]
+        u, v = math.floor(x), math.floor(y)
+        for row in range(max(v - 1, 0), min(v + 2, rows)):
+            for column in range(max(u - 1, 0), min(u + 2, columns)):
+                if cells[row, column] != 0:
+                    new[i] = False
+    return new
+
+
+@kernel
 def by_things(points: Points, chosen: NDArray[np.bool_]) -> None:
     """Choose, in place, all points of each thing of which enough are chosen, and none of the others."""
     first = chosen_here = 0

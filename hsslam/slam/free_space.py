@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hsslam.kernels.free_space import CELL, FARTHEST, in_free_space, mark
+from hsslam.kernels.free_space import CELL, FARTHEST, in_free_space, mark, unseen
 from hsslam.kernels.growth import make_room
 from hsslam.se2 import Points, Pose, Poses, compose
 
@@ -42,6 +42,10 @@ class FreeSpace:
     def holds(self, points: Points, pose: Pose) -> NDArray[np.bool_]:
         """Which of a scan's (N, 2) points are of things in the middle of it, the robot being at ``pose``, (N,)."""
         return in_free_space(self._cells, self._frame, points, pose)
+
+    def lacks(self, points: Points, pose: Pose) -> NDArray[np.bool_]:
+        """Which of a scan's (N, 2) points lie where nothing is known yet, the robot being at ``pose``, (N,)."""
+        return unseen(self._cells, self._frame, points, pose)
 
     def outside(self, points: Points, pose: Pose) -> Points:
         """The other points of the scan: those of what stays where it is."""

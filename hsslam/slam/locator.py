@@ -33,6 +33,13 @@ from hsslam.slam.windows import (
 EDGE_GAIN = 0.02
 """An answer beyond the window is believed only if its score is this much higher: among many places one seems better."""
 
+NEW_GROUND = 1.0 / 3.0
+"""What a return counts that lies where nothing is known yet, where two answers are compared: less than one that is
+explained, or all scans would be thought to lead into the unknown, more than none, or none would."""
+
+MUCH = 0.15
+"""Share of a scan's returns that is much to see for the first time."""
+
 SETTLINGS = 4
 """How often an answer is followed to the edge of the window around it, at most."""
 
@@ -151,12 +158,14 @@ class Locator:
         self._widest = search_window(rules.recovery_window)
         self._evaluations = 0
         self._enough = 1.0
+        self._told = False
 
     def locate(self, expected: Expectation) -> MatchResult:
         """The best answer, whose ``evaluations`` are those of all matches that it took."""
         # A robot that turns far between two scans may have turned farther than the usual window reaches.
         window = expected.window(self._window, self._widest)
         self._enough = max(expected.score - USUAL, self._rules.recovery_score)
+        self._told = expected.told
         with self._stopwatch.measure("track"):
             found = self._match(expected.pose, window)
             cut_off = _cut_off(found, expected, window, self._open_direction(found))
@@ -165,7 +174,9 @@ class Locator:
         if cut_off:
             with self._stopwatch.measure("recover"):
                 found = self._look_further(expected, found)
-        if expected.told and (_contradicts(found, expected) or self._doubtful(found)):
+        if expected.told and (
+            _contradicts(found, expected) or self._unusual(found) or self._drawn_back(expected)
+        ):
             with self._stopwatch.measure("recover"):
                 found = self._agree(expected, found)
         if self._doubtful(found):
@@ -199,8 +210,39 @@ class Locator:
     def _known_within(self, window: SearchWindow, result: MatchResult) -> MatchResult:
         return known_within(self._matcher, window, self._reference, self._points, result)
 
-    def _doubtful(self, result: MatchResult) -> bool:
+    def _unusual(self, result: MatchResult) -> bool:
         return not result.converged or result.score < self._rules.recovery_score
+
+    def _doubtful(self, result: MatchResult) -> bool:
+        """Whether an answer is unusual for what it denies, not for what it sees for the first time."""
+        if not self._unusual(result):
+            return False
+        if not (result.converged and self._told):
+            return True
+        return result.score < self._rules.recovery_score * (1.0 - self._new(result.pose))
+
+    def _drawn_back(self, expected: Expectation) -> bool:
+        """Whether a scan sees much for the first time along a corridor: what overlaps most seems to fit best."""
+        return self._new(expected.pose) > MUCH and not math.isnan(weak_direction(scan_lines(self._points)))
+
+    def _fit(self, result: MatchResult) -> float:
+        """An answer's score, in which returns count for something that lie where nothing is known yet.
+
+        Not where odometry does not tell: an answer that leads into the unknown then has nothing to say for itself.
+        """
+        return result.score + (NEW_GROUND * self._new(result.pose) if self._told else 0.0)
+
+    def _new(self, pose: Pose) -> float:
+        """Share of the returns that lie where nothing is known yet, the robot being at ``pose``."""
+        return float(np.count_nonzero(self._free_space.lacks(self._points, pose))) / max(len(self._points), 1)
+
+    def _better(self, other: MatchResult, first: MatchResult, gain: float) -> bool:
+        """Whether another answer is to replace the first: for a better fit, by ``gain`` if the first converged.
+
+        A method that did not come to rest may stand right where the scan belongs: what fits less well is no better.
+        """
+        least = gain if first.converged else 0.0
+        return other.converged and self._fit(other) > self._fit(first) + least
 
     def _without_passers_by(
         self, expected: Expectation, window: SearchWindow, first: MatchResult
@@ -219,16 +261,17 @@ class Locator:
     def _look_further(self, expected: Expectation, first: MatchResult) -> MatchResult:
         """Search the widest window around the prediction: what a narrow one found at its edge was cut off by it."""
         wide = self._match(expected.pose, self._widest)
-        return self._settled(wide if _better(wide, first, EDGE_GAIN) else first)
+        return self._settled(wide if self._better(wide, first, EDGE_GAIN) else first)
 
     def _agree(self, expected: Expectation, first: MatchResult) -> MatchResult:
         """Search only where odometry may be right: what fits about as well there is likelier than what denies it."""
         near = self._match(expected.pose, expected.window(AGREEING, self._window))
-        if not near.converged or near.score <= first.score - expected.least_gain(first.pose):
+        fit, usual = self._fit(near), self._fit(first)
+        if not near.converged or fit <= usual - expected.least_gain(first.pose):
             return first
         if not _at_rest(near, first):
             # What it is drawn to lies beyond the window: the first answer, or else another one.
-            return first if near.score <= first.score else self._settled(near)
+            return first if fit <= usual else self._settled(near)
         # What so narrow a window adds to the covariance is odometry's, and odometry is weighed by itself.
         return self._known_within(self._window, near)
 
@@ -236,7 +279,7 @@ class Locator:
         """Where odometry leaps or is late, try the last motion once more: that may reach further than any window."""
         best = self._match(expected.repeated, self._window)
         gain = LEAP_GAIN if way(expected.pose, expected.repeated) < IMPOSSIBLE else 0.0
-        better = best.converged and best.score > first.score + gain
+        better = best.converged and self._fit(best) > self._fit(first) + gain
         return best if better else first
 
     def _recover(self, expected: Expectation, first: MatchResult) -> MatchResult:
@@ -244,7 +287,7 @@ class Locator:
         best = self._match(expected.repeated, self._window)
         if self._doubtful(best):
             best = self._match(expected.repeated, self._widest)
-        if _better(best, first, expected.least_gain(best.pose)):
+        if self._better(best, first, expected.least_gain(best.pose)):
             return self._settled(best)
         return first
 
@@ -282,21 +325,13 @@ class Locator:
         """Search on around what was found far off: the wide window, too, may have cut it off."""
         for _ in range(SETTLINGS):
             near = self._match(found.pose, self._window)
-            if not near.converged or near.score < found.score - EDGE_GAIN:
+            if not near.converged or self._fit(near) < self._fit(found) - EDGE_GAIN:
                 return found
             moved = difference(near.pose, found.pose)
             found = self._known_within(self._widest, near)
             if not at_edge(moved, self._window):
                 break
         return found
-
-
-def _better(other: MatchResult, first: MatchResult, gain: float) -> bool:
-    """Whether another answer is to replace the first: for a score that is higher, by ``gain`` if the first converged.
-
-    A method that did not come to rest may stand right where the scan belongs: what fits less well is no better.
-    """
-    return other.converged and other.score > first.score + (gain if first.converged else 0.0)
 
 
 def _cut_off(
