@@ -109,6 +109,11 @@ class TrackerSection(Section):
         default=True,
         description="undo the robot's motion during a scan, where the log tells how long that takes",
     )
+    own_parts: bool = Field(
+        default=True,
+        description="leave out what the laser sees of the robot itself: near returns that stay where they are, "
+        "seen from there, while the robot drives and turns",
+    )
 
 
 class KeyframeSection(Section):

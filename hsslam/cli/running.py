@@ -82,6 +82,7 @@ def summary(
         ("dataset", f"{log.info.name}: {metrics['scans']:,} scans, {duration:,.0f} s of driving"),
         ("matcher", f"{metrics['matcher']}: {metrics['matched']:,} of {metrics['scans']:,} scans matched"),
         *([("lost", lost)] if (lost := _lost(metrics)) else []),
+        *([("own parts", own)] if (own := _own_parts(metrics)) else []),
         ("wall time", _wall_time(timings)),
         ("keyframes", f"{metrics['keyframes']:,}"),
         ("loops", f"{metrics['loops_accepted']:,} accepted of {metrics['loops_tried']:,} tried"),
@@ -110,6 +111,12 @@ def _lost(metrics: dict[str, Any]) -> str:
         f"{told['guessed']:,} scans (the first: {told['first_guessed']:,}) neither matched nor told of by "
         "odometry: the last motion was taken to go on, which is a guess"
     )
+
+
+def _own_parts(metrics: dict[str, Any]) -> str:
+    """How much of the view parts of the robot hide; nothing where there are none."""
+    degrees = metrics["statistics"]["own_parts_deg"]
+    return f"of the robot hide {degrees:.0f} degrees of the laser's view and were left out" if degrees else ""
 
 
 def _count(log: Dataset, shown: Progress) -> int | None:

@@ -26,6 +26,7 @@ from hsslam.slam.graph import PoseGraph
 from hsslam.slam.journal import Replay
 from hsslam.slam.loops import LoopCloser
 from hsslam.slam.overlap import match_pairs, moved, overlapping_pairs
+from hsslam.slam.own_parts import OwnParts
 from hsslam.slam.rescan import match_scans, worth_a_match
 from hsslam.slam.scan_pairs import match_with_keyframes
 from hsslam.slam.scan_table import ScanTable
@@ -70,6 +71,7 @@ class Slam:
         self._points: list[Points] = []
         self._loops: list[LoopChecked] = []
         self._scans = ScanTable()
+        self._own_parts = OwnParts()
         self._matched = 0
         self._evaluations = 0
         self._guessed = 0
@@ -104,13 +106,15 @@ class Slam:
         self._require_open()
         return list(self._process(scan))
 
-    def _process(self, scan: LaserScan) -> Iterator[Event]:
+    def _process(self, recorded: LaserScan) -> Iterator[Event]:
+        scan = self._own_parts.without(recorded)
         if self._graph is None:
             self._graph = PoseGraph(self._config.graph, scan.odometry)
             self._tracker.start(scan, scan.robot_points)
             first = TrackedScan(np.zeros(3), np.eye(3) * 1e-12, 1.0, True, 0)
             yield self._record(scan, 0, first, scan.robot_points)
             yield self._keep(scan, scan.robot_points)
+            self._watch(recorded)
             return
         scan = self._tracker.deskewed(scan)
         tracked = self._tracker.track(scan, scan.robot_points, self._known(scan.index))
@@ -123,7 +127,24 @@ class Slam:
         self._graph.add_keyframe(tracked.relative, tracked.covariance)
         self._scans.becomes_keyframe(newest + 1)
         yield self._keep(scan, lasting)
+        self._watch(recorded)
         yield from self._close_loops()
+
+    def _watch(self, keyframe: LaserScan) -> None:
+        """Look for parts of the robot in the newest keyframe, and forget what was seen of new ones."""
+        if not self._config.tracker.own_parts:
+            return
+        poses = self._require_graph().poses
+        if not self._own_parts.watch(keyframe, poses[-1]):
+            return
+        self._keyframes = [self._own_parts.without(scan) for scan in self._keyframes]
+        self._points = [
+            self._own_parts.outside(points, scan.laser_pose)
+            for points, scan in zip(self._points, self._keyframes, strict=True)
+        ]
+        lasers = [scan.laser_pose for scan in self._keyframes]
+        self._tracker.relearn(self._points, lasers, poses)
+        self._closer.release()
 
     def finish(self, last: bool = False) -> Iterator[Event]:
         """Optimise everything once more, match keyframes that overlap again from there, then every scan.
@@ -144,6 +165,7 @@ class Slam:
         if last:
             del self._tracker  # its submaps are of use to the next scan only
         graph = self._require_graph()
+        self._forget_own_parts()
         yield from self._settle(self._verifier.close())
         self._closer.release()
         yield self._optimise("final")
@@ -164,6 +186,14 @@ class Slam:
         if self._config.graph.rescan_keyframes:
             with self._stopwatch.measure("rescan"):
                 self._rescan(graph, last)
+
+    def _forget_own_parts(self) -> None:
+        """Leave out, of all scans' points, those of parts of the robot that were found later."""
+        if self._own_parts:
+            scans = self._scans
+            for i, keyframe in enumerate(scans.anchors):
+                points, laser = scans.points[i].astype(np.float64), self._keyframes[keyframe].laser_pose
+                scans.points[i] = self._own_parts.outside(points, laser).astype(np.float32)
 
     def _forget_passers_by(self, poses: Poses) -> None:
         """Leave out, of all points, those in what turned out to be free: who walks ahead hides it while driving."""
@@ -215,6 +245,7 @@ class Slam:
                 "evaluations": self._evaluations,
                 "guessed": self._guessed,
                 "first_guessed": self._first_guessed,
+                "own_parts_deg": self._own_parts.degrees,
             },
             covariances=graph.marginal_covariances() if self._config.graph.marginals else None,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from hsslam.config import Config
 from hsslam.matching.interface import Matcher
 from hsslam.scan import LaserScan
-from hsslam.se2 import Points, Pose, between, compose
+from hsslam.se2 import Points, Pose, Poses, between, compose
 from hsslam.slam.fusion import fuse, rotated
 from hsslam.slam.locator import Expectation, Locator
 from hsslam.slam.motion import MotionModel
@@ -123,6 +124,26 @@ class Tracker:
         with self._stopwatch.measure("submap"):
             self._submap.add(points, laser, tracked.relative)
         heading = self._pose[2]
+        self._pose = self._submap.newest
+        self._covariance = rotated(self._covariance, heading - self._pose[2])
+
+    def relearn(self, points: Sequence[Points], lasers: Sequence[Pose], poses: Poses) -> None:
+        """Make the submap anew; the last scan is the newest keyframe.
+
+        Parameters
+        ----------
+        points : sequence of Points
+            (N_i, 2) m of every keyframe in its own frame, one array each.
+        lasers : sequence of Pose
+            Of every keyframe, in its frame.
+        poses : Poses
+            (K, 3) where they are, all in one frame.
+        """
+        heading, size = self._submap.newest[2], self._config.keyframes.submap_size
+        self._submap = LocalSubmap(self._matcher, size)
+        with self._stopwatch.measure("submap"):
+            for k in range(max(len(poses) - size, 0), len(poses)):
+                self._submap.add(points[k], lasers[k], between(poses[max(k - 1, 0)], poses[k]))
         self._pose = self._submap.newest
         self._covariance = rotated(self._covariance, heading - self._pose[2])
 
