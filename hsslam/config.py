@@ -106,14 +106,9 @@ class TrackerSection(Section):
     )
     recovery_window: WindowSection = WindowSection(half_x=0.75, half_y=0.75, half_theta_deg=60.0)
     deskew: bool = Field(
-        default=True,
-        description="undo the robot's motion during a scan, where the log tells how long that takes",
+        default=True, description="undo the robot's motion during a scan, if the log tells how long that took"
     )
-    own_parts: bool = Field(
-        default=True,
-        description="leave out what the laser sees of the robot itself: near returns that stay where they are, "
-        "seen from there, while the robot drives and turns",
-    )
+    own_parts: bool = Field(default=True, description="leave out what the laser sees of the robot itself")
 
 
 class KeyframeSection(Section):
