@@ -13,7 +13,7 @@ from hsslam.se2 import Points, Pose
 BINS = 360
 """Directions that are told apart."""
 
-NEAREST = 1.5
+NEAREST = 1.0
 """Parts of a robot are nearer to its laser than this (m)."""
 
 STAYS = 0.12
