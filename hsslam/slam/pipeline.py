@@ -137,7 +137,8 @@ class Slam:
         poses = self._require_graph().poses
         if not self._own_parts.watch(keyframe, poses[-1]):
             return
-        self._keyframes = [self._own_parts.without(scan) for scan in self._keyframes]
+        # Copies again, as in `_keep`: looking for parts has made every scan remember its points.
+        self._keyframes = [replace(self._own_parts.without(scan)) for scan in self._keyframes]
         self._points = [
             self._own_parts.outside(points, scan.laser_pose)
             for points, scan in zip(self._points, self._keyframes, strict=True)

@@ -123,9 +123,7 @@ class Tracker:
         """Make the last scan the newest keyframe; its (N, 2) points and its laser are in the robot's frame."""
         with self._stopwatch.measure("submap"):
             self._submap.add(points, laser, tracked.relative)
-        heading = self._pose[2]
-        self._pose = self._submap.newest
-        self._covariance = rotated(self._covariance, heading - self._pose[2])
+        self._stand_on_newest()
 
     def relearn(self, points: Sequence[Points], lasers: Sequence[Pose], poses: Poses) -> None:
         """Make the submap anew; the last scan is the newest keyframe.
@@ -139,11 +137,16 @@ class Tracker:
         poses : Poses
             (K, 3) where they are, all in one frame.
         """
-        heading, size = self._submap.newest[2], self._config.keyframes.submap_size
+        size = self._config.keyframes.submap_size
         self._submap = LocalSubmap(self._matcher, size)
         with self._stopwatch.measure("submap"):
             for k in range(max(len(poses) - size, 0), len(poses)):
                 self._submap.add(points[k], lasers[k], between(poses[max(k - 1, 0)], poses[k]))
+        self._stand_on_newest()
+
+    def _stand_on_newest(self) -> None:
+        """Take the newest keyframe's pose for the last scan's, which it is, in the frame of the current submap."""
+        heading = self._pose[2]
         self._pose = self._submap.newest
         self._covariance = rotated(self._covariance, heading - self._pose[2])
 
