@@ -19,7 +19,7 @@ from hsslam.kernels.blocks import (
     find_segments,
     take_variances,
 )
-from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, GAP, Surface, lines_of, nearest_segment
+from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, Surface, lines_of, nearest_segment
 from hsslam.se2 import Points, Pose, transform
 
 DISTANCE, SCALE, LEAST = 0.12, 0.05, 0.3
@@ -94,7 +94,7 @@ def twin(
 def test_blocks_sum_up_what_numpy_sums_up(count: int, x: float, y: float, theta: float, both: bool) -> None:
     surface, points, pose = Surface.build(room(180, 0)), room(count, 1), np.array([x, y, theta])
     points = points - [0.3, 0.0]
-    lines = lines_of(points, GAP, FIT_SPAN, FIT_ROUGHNESS) if both else np.empty((0, 3))
+    lines = lines_of(points, FIT_SPAN, FIT_ROUGHNESS) if both else np.empty((0, 3))
     variances = np.random.default_rng(count).uniform(1.0, 3.0, count)
     expected = twin(surface, points, lines, variances, pose)
     assert sums(surface, points, lines, variances, pose) == pytest.approx(expected, rel=1e-9, abs=1e-9)

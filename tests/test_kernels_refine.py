@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hsslam.kernels.histogram import BINS, median_of
 from hsslam.kernels.lines import MEDIAN
 from hsslam.kernels.refine import NO_LINES, refine, solve3
-from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, GAP, Surface, lines_of, nearest_segment
+from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, Surface, lines_of, nearest_segment
 from hsslam.kernels.variances import ENOUGH, EVENNESS, FASTEST, GRAZING, LEAST_GRAZING, variances_of
 from hsslam.se2 import Points, Pose, transform
 
@@ -124,7 +124,7 @@ def test_refinement_returns_to_the_truth(x: float, y: float, theta: float, both_
         np.array([*(-np.array([[0.995004, 0.099833], [-0.099833, 0.995004]]) @ truth[:2]), -0.1]), reference
     )
     s = Surface.build(reference)
-    lines = lines_of(inverse_points, GAP, FIT_SPAN, FIT_ROUGHNESS) if both_ways else NO_LINES
+    lines = lines_of(inverse_points, FIT_SPAN, FIT_ROUGHNESS) if both_ways else NO_LINES
     start = truth + [x, y, theta]
     found, _, converged = refine(
         s.pieces, s.nearest, s.frame, inverse_points, lines, start, 30, 15.0, (0.15, 0.08), (0.03, 0.03)

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from hsslam.kernels.joints import joints_of
 from hsslam.kernels.surface import (
     FIT_ROUGHNESS,
     FIT_SPAN,
-    GAP,
     REACH,
     Surface,
     lines_of,
@@ -52,14 +52,14 @@ def test_every_point_lies_on_some_segment(points: NDArray[np.float64]) -> None:
 
 @given(clouds)
 @settings(deadline=None, max_examples=40)
-def test_segments_join_only_neighbours_closer_than_the_gap(points: NDArray[np.float64]) -> None:
+def test_a_segment_for_each_joint_and_for_each_lone_return(points: NDArray[np.float64]) -> None:
     surface = Surface.build(points)
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    lengths = np.linalg.norm(surface.segments[:, 2:] - surface.segments[:, :2], axis=1)
-    joined = steps <= GAP
-    lonely = ~np.concatenate(([False], joined)) & ~np.concatenate((joined, [False]))
-    assert len(surface.segments) == joined.sum() + lonely.sum()
-    assert lengths.max() <= GAP
+    joined = joints_of(points)
+    lonely = ~joined & ~np.concatenate(([False], joined[:-1]))
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    expected = np.where(joined, np.append(lengths, 0.0), 0.0)[joined | lonely]
+    found = np.linalg.norm(surface.segments[:, 2:] - surface.segments[:, :2], axis=1)
+    assert found == pytest.approx(expected)
 
 
 @given(clouds, st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=10))
@@ -93,7 +93,7 @@ def test_lines_average_noise_along_a_wall() -> None:
 def test_a_point_has_the_line_of_the_segment_that_begins_there_or_ends_where_none_begins() -> None:
     points = np.vstack((wall(spacing=0.02, noise=0.01), [[10.0, 10.0]], wall(spacing=0.05) + [0.0, 20.0]))
     surface = Surface.build(points)
-    lines = lines_of(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
+    lines = lines_of(points, FIT_SPAN, FIT_ROUGHNESS)
     for point, line in zip(points, lines, strict=True):
         begins = np.flatnonzero((surface.segments[:, :2] == point).all(axis=1))
         ends = np.flatnonzero((surface.segments[:, 2:] == point).all(axis=1))
@@ -105,7 +105,7 @@ def test_a_point_has_the_line_of_the_segment_that_begins_there_or_ends_where_non
 def test_all_normals_of_a_wall_are_on_the_same_side_whatever_its_noise(noise: float) -> None:
     there = wall(spacing=0.02, noise=noise)
     for points, side in ((there, 1.0), (there[::-1].copy(), -1.0)):
-        lines = lines_of(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
+        lines = lines_of(points, FIT_SPAN, FIT_ROUGHNESS)
         known = np.abs(lines[:, :2]).max(axis=1) > 0.0
         assert known.mean() > 0.9
         assert (side * lines[known, 1] > 0.0).all()

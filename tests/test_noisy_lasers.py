@@ -17,8 +17,9 @@ from hsslam.datasets.simulator import (
     SimulatedDataset,
 )
 from hsslam.datasets.simulator.solids import room
+from hsslam.kernels.joints import joints_of
 from hsslam.kernels.lines import ARM, ENOUGH, LONG, MEDIAN, PLENTY, fit_line, noise_of
-from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, GAP, Surface
+from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, Surface
 from hsslam.se2 import Points, between_many
 from hsslam.slam.pipeline import Slam
 
@@ -34,6 +35,11 @@ def with_corner(noise: float) -> Points:
     return np.vstack((along, np.column_stack((5.0 + up[:, 1], up[:, 0]))))
 
 
+def told(points: Points) -> float:
+    """The noise that a scan tells of by itself."""
+    return float(noise_of(points, joints_of(points)))
+
+
 def tilts(points: Points) -> NDArray[np.float64]:
     """Angles (rad) between the lines and the wall, of those pieces that have a line."""
     normals = Surface.build(points).pieces[:, 5:7]
@@ -44,7 +50,7 @@ def tilts(points: Points) -> NDArray[np.float64]:
 @pytest.mark.parametrize("noise", [0.005, 0.02, 0.05, 0.08])
 @pytest.mark.parametrize("spacing", [0.02, 0.05, 0.12])
 def test_noise_is_told_from_the_returns(noise: float, spacing: float) -> None:
-    assert noise_of(wall(noise, spacing), GAP) == pytest.approx(noise, rel=0.5)
+    assert told(wall(noise, spacing)) == pytest.approx(noise, rel=0.5)
 
 
 def noise_twin(points: Points, arm: float) -> float:
@@ -71,7 +77,7 @@ def test_noise_agrees_with_numpy(noise: float, spacing: float) -> None:
     expected = noise_twin(points, ARM)
     if expected > LONG * ARM:
         expected = min(expected, noise_twin(points, expected / LONG))
-    assert noise_of(points, GAP) == pytest.approx(expected, abs=1e-12)
+    assert told(points) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.0, 2.5, -2.0])
@@ -79,9 +85,9 @@ def test_lines_agree_with_numpy(turn: float) -> None:
     """Of a quiet wall: the short axis of the returns within half a span of each segment's middle."""
     c, s = math.cos(turn), math.sin(turn)
     points = wall(0.002, 0.02) @ np.array([[c, s], [-s, c]])
-    line = np.empty(6)
+    line, joined = np.empty(6), joints_of(points)
     for i in range(0, len(points) - 1, 7):
-        fit_line(points, i, GAP, FIT_SPAN, FIT_ROUGHNESS, 0.002, line)
+        fit_line(points, i, joined, FIT_SPAN, FIT_ROUGHNESS, 0.002, line)
         middle = 0.5 * (points[i] + points[i + 1])
         near = points[np.linalg.norm(points - middle, axis=1) <= 0.5 * FIT_SPAN]
         _, scatter, axes = np.linalg.svd(near - near.mean(axis=0))
@@ -93,11 +99,11 @@ def test_lines_agree_with_numpy(turn: float) -> None:
 
 
 def test_corners_are_no_noise() -> None:
-    assert noise_of(with_corner(0.005), GAP) < 0.01
+    assert told(with_corner(0.005)) < 0.01
 
 
 def test_too_few_returns_tell_of_no_noise() -> None:
-    assert noise_of(wall(0.05)[:4], GAP) == 0.0
+    assert told(wall(0.05)[:4]) == 0.0
 
 
 @pytest.mark.parametrize("noise", [0.05, 0.08])

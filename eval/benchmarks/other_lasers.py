@@ -193,6 +193,7 @@ def jumping(motion: Pose, rng: np.random.Generator) -> Pose:
 
 VARIANTS: dict[str, tuple[str, Variant]] = {
     "recorded": ("as it was recorded", lambda log, _: log),
+    "second-beams": ("every second beam", partial(sparse, 2)),
     "third-beams": ("every third beam", partial(sparse, 3)),
     "sixth-beams": ("every sixth beam", partial(sparse, 6)),
     "narrow-120": ("the middle 120 degrees", partial(narrow, 120.0)),

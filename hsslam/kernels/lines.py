@@ -39,28 +39,28 @@ VAGUE = 0.35
 
 
 @kernel
-def noise_of(points: Points, gap: float) -> float:
+def noise_of(points: Points, joined: NDArray[np.bool_]) -> float:
     """Standard deviation (m) of returns across the surface that they lie on, from the returns themselves.
 
     The median of the distances of up to `PLENTY` of them, spread over all, from chords to either side, as it would be
     on plain surfaces: what corners and edges add are outliers to it. 0 where too few returns have neighbours to tell.
     """
-    noise = _noise_about_chords(points, gap, ARM)
+    noise = _noise_about_chords(points, joined, ARM)
     if noise > LONG * ARM:
         # Returns that noise took far away end chords that are too short for it.
-        return min(noise, _noise_about_chords(points, gap, noise / LONG))
+        return min(noise, _noise_about_chords(points, joined, noise / LONG))
     return noise
 
 
 @kernel
-def _noise_about_chords(points: Points, gap: float, arm: float) -> float:
+def _noise_about_chords(points: Points, joined: NDArray[np.bool_], arm: float) -> float:
     """As `noise_of`, with chords of a given length to either side (m)."""
     n = points.shape[0]
     found = np.empty(n)
     count = 0
     for i in range(1, n - 1, 1 + n // PLENTY):
-        a = _end_of_arm(points, i, -1, gap, arm)
-        b = _end_of_arm(points, i, 1, gap, arm)
+        a = _end_of_arm(points, i, -1, joined, arm)
+        b = _end_of_arm(points, i, 1, joined, arm)
         dx, dy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
         squared = dx * dx + dy * dy
         if a == i or b == i or squared < arm * arm:
@@ -77,13 +77,12 @@ def _noise_about_chords(points: Points, gap: float, arm: float) -> float:
 
 
 @kernel
-def _end_of_arm(points: Points, i: int, step: int, gap: float, arm: float) -> int:
+def _end_of_arm(points: Points, i: int, step: int, joined: NDArray[np.bool_], arm: float) -> int:
     """The first return ``arm`` (m) from return ``i`` along the surface, or the last before the surface ends."""
     j = i
     while 0 <= j + step < points.shape[0]:
         k = j + step
-        gx, gy = points[k, 0] - points[j, 0], points[k, 1] - points[j, 1]
-        if gx * gx + gy * gy > gap * gap:
+        if not joined[min(j, k)]:
             break
         j = k
         rx, ry = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
@@ -96,7 +95,7 @@ def _end_of_arm(points: Points, i: int, step: int, gap: float, arm: float) -> in
 def fit_line(
     points: Points,
     i: int,
-    gap: float,
+    joined: NDArray[np.bool_],
     span: float,
     roughness: float,
     noise: float,
@@ -122,7 +121,7 @@ def fit_line(
     out[5] = 0.0
     strays = max(roughness, SAME * noise)
     for _ in range(WIDENINGS + 1):
-        _fit_within(points, i, gap, span, strays, out)
+        _fit_within(points, i, joined, span, strays, out)
         if noise * noise * out[4] <= STEADY * STEADY:
             return
         span *= 2.0
@@ -133,7 +132,7 @@ def fit_line(
 
 @kernel
 def _fit_within(
-    points: Points, i: int, gap: float, span: float, roughness: float, out: NDArray[np.float64]
+    points: Points, i: int, joined: NDArray[np.bool_], span: float, roughness: float, out: NDArray[np.float64]
 ) -> None:
     """Fit a line to the points within a stretch, unless they stray from it or are not more than the segment's two."""
     n = points.shape[0]
@@ -145,9 +144,8 @@ def _fit_within(
         j = i if step < 0 else i + 1
         while 0 <= j + step < n:
             k = j + step
-            gx, gy = points[k, 0] - points[j, 0], points[k, 1] - points[j, 1]
             rx, ry = points[k, 0] - mx, points[k, 1] - my
-            if gx * gx + gy * gy > gap * gap or rx * rx + ry * ry > limit:
+            if not joined[min(j, k)] or rx * rx + ry * ry > limit:
                 break
             j = k
         if step < 0:

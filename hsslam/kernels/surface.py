@@ -1,8 +1,8 @@
 """The surface through a reference's points, and which piece of it is nearest to any place.
 
-Neighbouring returns that are close to one another are joined by a segment; a lone return is a segment of
-length zero. Every segment carries a line fitted to the returns around it, since a segment between two noisy
-returns a few centimetres apart points nowhere in particular. A raster answers "which segment is nearest?".
+Neighbouring returns of the same surface are joined by a segment; a lone return is a segment of length zero. Every
+segment carries a line fitted to the returns around it, since a segment between two noisy returns a few centimetres
+apart points nowhere in particular. A raster answers "which segment is nearest?".
 """
 
 from __future__ import annotations
@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 
 from hsslam.jit import kernel
 from hsslam.kernels.growth import make_room
+from hsslam.kernels.joints import joints_of
 from hsslam.kernels.lines import fit_line, noise_of
 from hsslam.se2 import Points
-
-GAP = 0.35
-"""Neighbouring returns further apart than this (m) are not joined."""
 
 FIT_SPAN = 0.15
 """A line is fitted to the returns within this stretch of surface around a segment (m), or more if they are noisy."""
@@ -75,14 +73,14 @@ class Surface:
     @classmethod
     def build(cls, points: Points) -> Surface:
         """Make the surface of (N, 2) finite points in beam order; scans may follow one another."""
-        segments, pieces, tilts = join(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
+        segments, pieces, tilts = join(points, FIT_SPAN, FIT_ROUGHNESS)
         return cls(segments, pieces, tilts, *rasterise_nearest(segments, RESOLUTION, REACH))
 
     def extended(self, points: Points) -> Surface:
         """The surface with one more scan's (N, 2) points; takes over this one's raster, which is then void."""
         if len(points) == 0:
             return self
-        added, pieces, tilts = join(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
+        added, pieces, tilts = join(points, FIT_SPAN, FIT_ROUGHNESS)
         segments = np.concatenate((self.segments, added))
         pieces, tilts = np.concatenate((self.pieces, pieces)), np.concatenate((self.tilts, tilts))
         left, bottom, right, top = bounds(added)
@@ -123,35 +121,32 @@ def bounds(segments: NDArray[np.float64]) -> tuple[float, float, float, float]:
 
 @kernel
 def join(
-    points: Points, gap: float, span: float, roughness: float
+    points: Points, span: float, roughness: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Segments (S, 4) between neighbouring points closer than ``gap``, `Surface.pieces` and `Surface.tilts`."""
+    """Segments (S, 4) between joined neighbours, see `joints_of`, `Surface.pieces` and `Surface.tilts`."""
     n = points.shape[0]
     segments = np.empty((n, 4))
     pieces = np.empty((n, 8))
     tilts = np.empty((n, 2))
     line = np.empty(6)
-    noise = noise_of(points, gap)
+    joined = joints_of(points)
+    noise = noise_of(points, joined)
     count = 0
     joined_before = False
     for i in range(n):
         dx = dy = length = 0.0
-        joined = False
-        if i + 1 < n:
+        if joined[i]:
             dx = points[i + 1, 0] - points[i, 0]
             dy = points[i + 1, 1] - points[i, 1]
-            joined = dx * dx + dy * dy <= gap * gap
-        if joined:
-            fit_line(points, i, gap, span, roughness, noise, line)
             length = math.sqrt(dx * dx + dy * dy)
+            fit_line(points, i, joined, span, roughness, noise, line)
         elif not joined_before:
             line[:] = 0.0
-            dx = dy = 0.0
-        if joined or not joined_before:
+        if joined[i] or not joined_before:
             ax, ay = points[i, 0], points[i, 1]
             segments[count, 0], segments[count, 1] = ax, ay
             segments[count, 2], segments[count, 3] = ax, ay
-            if joined:
+            if joined[i]:
                 segments[count, 2], segments[count, 3] = points[i + 1, 0], points[i + 1, 1]
             pieces[count, 0], pieces[count, 1] = ax, ay
             pieces[count, 2] = dx / length if length > 0.0 else 0.0
@@ -161,31 +156,27 @@ def join(
             pieces[count, 7] = line[2] * line[0] + line[3] * line[1]
             tilts[count, 0], tilts[count, 1] = line[4], line[5]
             count += 1
-        joined_before = joined
+        joined_before = joined[i]
     return segments[:count].copy(), pieces[:count].copy(), tilts[:count].copy()
 
 
 @kernel
-def lines_of(points: Points, gap: float, span: float, roughness: float) -> NDArray[np.float64]:
+def lines_of(points: Points, span: float, roughness: float) -> NDArray[np.float64]:
     """Line through each point and its neighbours: unit normal and offset, (N, 3); zero where there are none."""
     n = points.shape[0]
     lines = np.empty((n, 3))
     line = np.zeros(6)
-    noise = noise_of(points, gap)
+    joined = joints_of(points)
+    noise = noise_of(points, joined)
     joined_before = False
     for i in range(n):
-        joined = False
-        if i + 1 < n:
-            dx = points[i + 1, 0] - points[i, 0]
-            dy = points[i + 1, 1] - points[i, 1]
-            joined = dx * dx + dy * dy <= gap * gap
-        if joined:
-            fit_line(points, i, gap, span, roughness, noise, line)
+        if joined[i]:
+            fit_line(points, i, joined, span, roughness, noise, line)
         elif not joined_before:
             line[:] = 0.0
         lines[i, 0], lines[i, 1] = line[2], line[3]
         lines[i, 2] = line[2] * line[0] + line[3] * line[1]
-        joined_before = joined
+        joined_before = joined[i]
     return lines
 
 

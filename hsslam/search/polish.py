@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hsslam.jit import kernel
 from hsslam.kernels.refine import refine
-from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, GAP, lines_of
+from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, lines_of
 from hsslam.kernels.window import inside, kept
 from hsslam.matching.interface import Reference, SearchWindow
 from hsslam.se2 import Points, Pose
@@ -31,7 +31,7 @@ Where a truth lies near the edge, noise alone carries the refined pose across it
 @kernel
 def scan_lines(points: Points) -> NDArray[np.float64]:
     """Lines through a scan's (N, 2) points as `polish` wants them, see `hsslam.kernels.surface.lines_of`."""
-    return lines_of(points, GAP, FIT_SPAN, FIT_ROUGHNESS)
+    return lines_of(points, FIT_SPAN, FIT_ROUGHNESS)
 
 
 @kernel
