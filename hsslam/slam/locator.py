@@ -106,9 +106,14 @@ class Expectation:
         variances = self.covariance
         return foreseen_window(max(variances[0, 0], variances[1, 1]), variances[2, 2], least, most)
 
+    @property
+    def goes_on(self) -> bool:
+        """Whether odometry goes on as the robot went: no message of it is late."""
+        return way(self.pose, self.repeated) <= UNLIKE
+
     def belies(self, found: MatchResult) -> bool:
         """Whether an answer fits less than usual, and the robot did not go on: a message of odometry may be late."""
-        return found.score < self.score - USUAL and way(self.pose, self.repeated) > UNLIKE
+        return found.score < self.score - USUAL and not self.goes_on
 
     def least_gain(self, found: Pose) -> float:
         """By how much an answer must score higher to overrule odometry: it matters which goes on as the robot went."""
@@ -269,7 +274,8 @@ class Locator:
         fit, usual = self._fit(near), self._fit(first)
         if not near.converged or fit <= usual - expected.least_gain(first.pose):
             return first
-        if not _at_rest(near, first):
+        bare = expected.goes_on and self._open_direction(near) is not None
+        if not (bare or _at_rest(near, first)):
             # What it is drawn to lies beyond the window: the first answer, or else another one.
             return first if fit <= usual else self._settled(near)
         # What so narrow a window adds to the covariance is odometry's, and odometry is weighed by itself.
