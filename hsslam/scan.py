@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.se2 import Points, Pose, transform
+from hsslam.se2 import Points, Pose, pose, transform
 
 
 @dataclass(frozen=True)
@@ -112,6 +112,15 @@ class LaserScan:
             seconds = self.geometry.time_increment * np.flatnonzero(self.valid)
             points = _moved(points, seconds[:, None] * self.velocity)
         return points if self.geometry.angle_increment > 0.0 else points[::-1].copy()
+
+    @property
+    def middle(self) -> Pose:
+        """The robot in the middle of the sweep, seen from the robot at the stamp, as `velocity` has it."""
+        if self.geometry.time_increment == 0.0 or not self.velocity.any():
+            return np.zeros(3)
+        twist = 0.5 * self.geometry.time_increment * len(self.ranges) * self.velocity
+        x, y = _moved(np.zeros((1, 2)), twist[None])[0]
+        return pose(x, y, twist[2])
 
 
 @kernel

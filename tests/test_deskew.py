@@ -124,3 +124,24 @@ def test_a_map_is_the_sharper_for_it(log: SimulatedDataset) -> None:
     ]
     occupied = [np.count_nonzero(build_grid(kind, log.poses[:-1]).log_odds > 0.0) for kind in (moving, scans)]
     assert occupied[0] < 0.9 * occupied[1]
+
+
+@given(velocity=st.tuples(*[st.floats(-2.0, 2.0)] * 3))
+def test_the_middle_of_a_sweep_is_half_of_it_twice(velocity: tuple[float, float, float]) -> None:
+    geometry = ScanGeometry(-3.0, 0.06, time_increment=0.002)
+    scan = LaserScan(0.0, np.ones(100), geometry, velocity=pose(*velocity))
+    whole = replace(scan, ranges=np.ones(200)).middle
+    assert compose(scan.middle, scan.middle) == pytest.approx(whole, abs=1e-9)
+    assert replace(scan, velocity=np.zeros(3)).middle.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_without_odometry_velocities_do_not_swing_from_scan_to_scan(log: SimulatedDataset) -> None:
+    """A sweep moved by too much velocity is matched too far back, and the next one would be moved by too little."""
+    slam = Slam(load_config(overrides=["loops.enabled=false"]))
+    scans = [replace(scan, odometry=np.zeros(3)) for scan in log.scans()]
+    found = np.array([slam.process(scan)[0].pose for scan in scans])  # type: ignore[union-attr]
+    steps = between_many(found[:-1], found[1:])
+    truth = between_many(log.poses[:-1], log.poses[1:])
+    off = np.array([between(t, s) for t, s in zip(truth, steps, strict=True)])
+    assert np.hypot(off[:, 0], off[:, 1]).max() < 0.1
+    assert np.degrees(np.abs(off[:, 2])).max() < 3.0

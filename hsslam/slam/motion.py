@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hsslam.config import GraphSection
 from hsslam.scan import LaserScan
-from hsslam.se2 import Pose, between, wrap
+from hsslam.se2 import Pose, between, compose, wrap
 from hsslam.slam.clock import ScanClock
 
 SILENT_AFTER = 2
@@ -57,12 +57,13 @@ class MotionModel:
         self._last_step: Pose = np.zeros(3)
         self._last_motion: Pose = np.zeros(3)
         self._last_seconds = 0.0
+        self._middle: Pose = np.zeros(3)
         self._clock = ScanClock()
         self._silent = 0
 
     @property
     def last_motion(self) -> Pose:
-        """What the scans said between the last two."""
+        """What the scans said between the middles of the last two sweeps."""
         return self._last_motion
 
     @property
@@ -109,7 +110,14 @@ class MotionModel:
         return step / seconds
 
     def observe(self, scan: LaserScan, motion: Pose, matched: bool) -> None:
-        """Take note of the motion from the last scan to this, and whether a match told it."""
+        """Take note of the motion from the last scan to this, and whether a match told it.
+
+        A sweep whose beams were moved by too much velocity is matched too far back, by half of that: only its middle
+        is where it seems to be. Velocities told from stamp to stamp would swing ever wider, from scan to scan.
+        """
+        middle = scan.middle
+        motion = between(self._middle, compose(motion, middle))
+        self._middle = middle
         if self.silent and self.still(scan) and not matched:
             motion = FADING * motion
         if not self.still(scan):
