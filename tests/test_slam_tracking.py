@@ -218,3 +218,30 @@ def test_a_robot_that_drives_backwards_is_not_drawn_to_what_it_saw_before(seed: 
     # Three of these four leapt forward by half a metre to a whole one, up to four times.
     assert np.abs(np.diff(off)).max() < 0.2
     assert abs(off[-1] - off[0]) < 0.4
+
+
+@pytest.mark.parametrize("returns", [3, 6, 9])
+def test_few_returns_fit_anywhere_and_odometry_stands_in(returns: int) -> None:
+    slam = Slam(load_config())
+    slam.process(room_scan_at(np.zeros(3), beams=361, noise=0.005))
+    moved = pose(0.1, 0.0, 0.05)
+    second = room_scan_at(moved, beams=361, noise=0.005, seed=1)
+    ranges = np.full(361, np.inf)
+    ranges[170 : 170 + returns] = second.ranges[170 : 170 + returns]
+    (event, *_) = slam.process(replace(second, index=1, ranges=ranges))
+    assert isinstance(event, Tracked)
+    assert not event.matched
+    assert event.relative == pytest.approx(moved)
+
+
+def test_a_laser_that_sees_no_end_of_a_corridor_follows_odometry() -> None:
+    """What the far side of a door post looks like, 14 cm behind, fits a little better than bare walls ahead."""
+    log = SimulatedDataset("corridor", scans=400, seed=1)
+    slam = Slam(load_config(overrides=["loops.enabled=false", "seed=1"]))
+    found = [
+        slam.process(replace(scan, ranges=np.where(scan.ranges < 3.0, scan.ranges, np.inf)))[0].pose  # type: ignore[union-attr]
+        for scan in log.scans()
+    ]
+    steps = between_many(np.array(found[:-1]), np.array(found[1:]))
+    off = between_many(between_many(log.poses[:-1], log.poses[1:]), steps)
+    assert np.hypot(*off[:, :2].T).max() < 0.1

@@ -64,6 +64,9 @@ UNLIKE = 0.1
 IMPOSSIBLE = 1.0
 """By none at all, where odometry leaps further than this (m + rad) from where the robot was going."""
 
+FEW = 6
+"""An answer elsewhere explains more than the first by at least as many returns: few of them fit somewhere always."""
+
 FARTHER = 7.0
 """How many times the first answer's standard deviation an answer at a bottom of its own may have."""
 
@@ -246,7 +249,7 @@ class Locator:
 
         A method that did not come to rest may stand right where the scan belongs: what fits less well is no better.
         """
-        least = gain if first.converged else 0.0
+        least = max(gain if first.converged else 0.0, FEW / max(len(self._points), 1))
         return other.converged and self._fit(other) > self._fit(first) + least
 
     def _without_passers_by(

@@ -24,6 +24,9 @@ from hsslam.slam.submap import LocalSubmap
 SOONER = 1.0 / 3.0
 """Share of the usual way to the next keyframe after which one is made where the submap explains too little."""
 
+LEAST_RETURNS = 10
+"""Returns that a match must explain to be believed: fewer fit in many a place."""
+
 FORGETTING = 0.1
 """Share of the newest score in what is usual."""
 
@@ -167,7 +170,8 @@ class Tracker:
         result = Locator(rules, self._matcher, self._submap.current, points, rng, self._stopwatch).locate(
             expected
         )
-        matched = result.converged and result.score >= rules.min_score
+        explained = result.score * len(points)
+        matched = result.converged and result.score >= rules.min_score and explained >= LEAST_RETURNS
         if not matched:
             pose, covariance = predicted, prior
         elif rules.fuse_odometry:
