@@ -176,6 +176,18 @@ def by_odometry(
     return replace(log, scans=scans)
 
 
+def held(step: int, log: Recording, _: np.random.Generator) -> Recording:
+    """Odometry that comes less often than scans: the last message again, until there is a new one."""
+    scans = [replace(scan, odometry=log.scans[i - i % step].odometry) for i, scan in enumerate(log.scans)]
+    return replace(log, scans=scans)
+
+
+def delayed(scans: int, log: Recording, _: np.random.Generator) -> Recording:
+    """Odometry that comes so many scans late."""
+    late = [replace(scan, odometry=log.scans[max(i - scans, 0)].odometry) for i, scan in enumerate(log.scans)]
+    return replace(log, scans=late)
+
+
 def none(motion: Pose, _: np.random.Generator) -> Pose:
     """No odometry."""
     return np.zeros(3)
@@ -214,6 +226,10 @@ VARIANTS: dict[str, tuple[str, Variant]] = {
     "backwards": ("from the end to the beginning, smooth odometry", backwards),
     "no-odometry": ("no odometry", partial(by_odometry, none)),
     "slipping": ("odometry 10 % too long, 30 % noise", partial(by_odometry, slipping)),
+    "held-2": ("odometry with every second scan", partial(held, 2)),
+    "held-4": ("odometry with every fourth scan", partial(held, 4)),
+    "delayed-1": ("odometry a scan late", partial(delayed, 1)),
+    "delayed-3": ("odometry three scans late", partial(delayed, 3)),
     "jumping": ("odometry that jumps every 200 scans", partial(by_odometry, jumping)),
 }
 """What is done to the log, in words and in code."""

@@ -80,6 +80,12 @@ class MotionModel:
         """Whether odometry's motion to a scan is unlike the one before: wheels slip, messages come late."""
         return way(self._last_step, between(self._odometry, scan.odometry)) > LEAP
 
+    def _held(self, scan: LaserScan) -> bool:
+        """Whether odometry says the same as for the last scan, or said so then, although the robot moved."""
+        return way(np.zeros(3), self._last_motion) > MOVING and (
+            self.still(scan) or not self._last_step.any()
+        )
+
     def start(self, scan: LaserScan) -> None:
         """Begin with the first scan."""
         self._odometry = scan.odometry
@@ -96,13 +102,15 @@ class MotionModel:
     def velocity(self, scan: LaserScan) -> Pose:
         """Velocity (m/s, m/s, rad/s) from the last scan to this, in the robot's frame; 0 where stamps do not tell.
 
-        A sweep takes no longer than the time to the next scan. Where odometry leaps, the last motion goes on.
+        A sweep takes no longer than the time to the next scan. Where odometry leaps, or comes with some scans only,
+        the last motion goes on.
         """
         seconds = self._clock.since_last(scan.stamp)
         if seconds == 0.0:
             return np.zeros(3)
         seconds = max(seconds, abs(scan.geometry.time_increment) * len(scan.ranges))
-        moved = self._last_motion if self.leaps(scan) and self._last_seconds > 0.0 else self.predict(scan)[0]
+        goes_on = self._last_seconds > 0.0 and (self.leaps(scan) or self._held(scan))
+        moved = self._last_motion * self._stretch(scan.stamp) if goes_on else self.predict(scan)[0]
         # The step of a motion at constant velocity: the logarithm of SE(2).
         half = 0.5 * moved[2]
         scale = half / math.tan(half) if abs(half) > 1e-9 else 1.0
