@@ -46,6 +46,9 @@ SETTLINGS = 4
 USUAL = 0.05
 """A scan fits as usual if its score is no further than this below those of the last scans."""
 
+UNFIT = 0.15
+"""A scan fits badly if its score is this far below those of the last scans."""
+
 RECOVERY_GAIN = 0.12
 """Odometry is overruled only by an answer whose score is this much higher: people who walk along see no motion."""
 
@@ -195,6 +198,8 @@ class Locator:
                 found = self._steadier(expected, found)
         if self._open_direction(found) is not None:
             found = self._left_open(expected, found)
+        if expected.told and found.score < expected.score - UNFIT and _contradicts(found, expected):
+            found = _unsure(found, expected)
         return replace(found, evaluations=self._evaluations)
 
     def _match(self, guess: Pose, window: SearchWindow) -> MatchResult:
@@ -365,6 +370,12 @@ def _at_rest(near: MatchResult, first: MatchResult) -> bool:
     """
     deviations, sure = (np.sqrt(np.diag(result.covariance)) for result in (near, first))
     return bool(np.all(deviations <= np.maximum(FARTHER * sure, AT_REST)))
+
+
+def _unsure(result: MatchResult, expected: Expectation) -> MatchResult:
+    """An answer that fits badly and denies odometry, with what is between the two as its deviation."""
+    off = difference(result.pose, expected.pose)
+    return replace(result, covariance=result.covariance + np.outer(off, off))
 
 
 def _contradicts(result: MatchResult, expected: Expectation) -> bool:
