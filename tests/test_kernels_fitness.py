@@ -149,6 +149,21 @@ def test_a_plain_wall_leaves_its_own_direction_open_and_a_corner_none() -> None:
     assert np.isnan(degenerate_direction(covariance, WINDOW))
 
 
+def largest_offset(
+    centres: NDArray[np.float64], a: NDArray[np.float64], b: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Larger of the offsets along x and y of each centre from the place of a segment where it is smallest."""
+    (x, y), (dx, dy) = (centres - a).T, b - a
+    # Both offsets are straight in the share of the segment: look where either is zero, and where they are the same.
+    pairs = [(x, dx), (y, dy), (x - y, dx - dy), (x + y, dx + dy)]
+    shares = [np.clip(offset / step, 0.0, 1.0) for offset, step in pairs if abs(step) > 1e-12]
+    return np.asarray(
+        np.min(
+            [np.maximum(abs(x - t * dx), abs(y - t * dy)) for t in [0.0 * x, 0.0 * x + 1.0, *shares]], axis=0
+        )
+    )
+
+
 @given(clouds, st.floats(0.02, 0.2))
 @settings(deadline=None, max_examples=30)
 def test_squares_along_segments_are_those_around_their_places(
@@ -158,13 +173,9 @@ def test_squares_along_segments_are_those_around_their_places(
     raster = Raster.build(segments, half_side, 0.025)
     rows, columns = np.indices(raster.cells.shape).reshape(2, -1)
     centres = raster.frame[:2] + (np.column_stack((columns, rows)) + 0.5) / raster.frame[2]
-    shares = np.linspace(0.0, 1.0, 201)
     gap = np.full(len(centres), np.inf)
     for a, b in zip(segments[:, :2], segments[:, 2:], strict=True):
-        places = a + shares[:, None] * (b - a) if (a != b).any() else a[None]
-        near = np.flatnonzero((np.abs(centres - 0.5 * (a + b)) <= 0.2 + half_side).all(axis=1))
-        distance = np.abs(centres[near, None] - places[None]).max(axis=-1).min(axis=1)
-        gap[near] = np.minimum(gap[near], distance)
+        gap = np.minimum(gap, largest_offset(centres, a, b))
     clear = np.abs(gap - half_side) > 0.002
     assert (raster.cells.ravel()[clear] == (gap < half_side)[clear]).all()
 
