@@ -121,6 +121,27 @@ def test_what_did_not_come_to_rest_gives_way_only_to_what_fits_better(
     assert found.converged is believed
 
 
+@pytest.mark.parametrize(("more", "stays"), [(5, True), (11, False)])
+def test_of_few_returns_many_have_to_fit_better_elsewhere(more: int, stays: bool) -> None:
+    """Six more, of which those that lie on new ground where the first answer is count a third there already."""
+    matcher = RestlessHere()
+    matcher.leapt = elsewhere = pose(0.7, 0.1, 0.2)
+    points = POINTS[:24]
+    known = np.concatenate((transform(STEADY, points[:12]), transform(elsewhere, points[: 12 + more])))
+    expected = Expectation(
+        pose=STEADY,
+        covariance=np.diag([0.01, 0.01, 0.02]) ** 2,
+        repeated=STEADY,
+        told=True,
+        leaps=False,
+        score=0.95,
+    )
+    submap = GrowingSubmap(matcher, known, np.zeros(3))
+    rng = np.random.default_rng(0)
+    found = Locator(TrackerSection(), matcher, submap, points, rng, Stopwatch()).locate(expected)
+    assert found.pose == pytest.approx(STEADY if stays else elsewhere)
+
+
 class Drawn(OneOfTwo):
     """In a window that reaches it, the pose that odometry denies; in a narrow one, a place on the way there."""
 
