@@ -111,3 +111,27 @@ def test_late_stamps_do_not_stretch_the_motion_that_stands_in_for_odometry() -> 
     for scan in scans[20:]:
         assert model.predict(scan)[0] == pytest.approx(step)
         model.observe(scan, step, matched=True)
+
+
+@pytest.mark.parametrize(
+    ("stamp", "paused"),
+    [(0.1, False), (0.45, False), (0.9, False), (1.1, True), (3600.0, True), (-0.5, False), (-50.0, True)],
+)
+def test_a_recording_paused_where_stamps_leap(stamp: float, paused: bool) -> None:
+    clock = ScanClock()
+    stamps = in_turn(0.1, 20).tolist()
+    for known in stamps:
+        clock.observe(known)
+    assert clock.paused(stamps[-1] + stamp) is paused
+    assert clock.pause(stamps[-1] + stamp) == pytest.approx(stamp if stamp > 0.0 else math.inf, abs=1e-6)
+
+
+def test_slow_recordings_do_not_pause_and_the_first_scans_do_not_tell() -> None:
+    slow, young = ScanClock(), ScanClock()
+    for stamp in in_turn(2.0, 20).tolist():
+        slow.observe(stamp)
+    assert not slow.paused(stamp + 6.0)
+    assert slow.paused(stamp + 11.0)
+    for stamp in in_turn(0.1, 5).tolist():
+        young.observe(stamp)
+    assert not young.paused(stamp + 11.0)

@@ -10,7 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hsslam.slam.fusion import GATE, fuse, inverse3, rotated, squared_mahalanobis
+from hsslam.se2 import inverse
+from hsslam.slam.fusion import (
+    GATE,
+    fuse,
+    inverse3,
+    largest_variance,
+    of_inverse,
+    rotated,
+    squared_mahalanobis,
+)
 
 Matrix = NDArray[np.float64]
 
@@ -41,6 +50,22 @@ def test_rotated_is_a_congruence(covariance: Matrix, angle: float) -> None:
     turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     np.testing.assert_allclose(rotated(covariance, angle), turn @ covariance @ turn.T, atol=1e-15)
     np.testing.assert_allclose(rotated(rotated(covariance, angle), -angle), covariance, atol=1e-15)
+
+
+@settings(deadline=None)
+@given(covariances(), poses())
+def test_the_covariance_of_an_inverse_follows_its_derivatives(covariance: Matrix, pose: Matrix) -> None:
+    steps = 1e-6 * np.eye(3)
+    change = np.array([(inverse(pose + step) - inverse(pose - step)) / 2e-6 for step in steps]).T
+    np.testing.assert_allclose(of_inverse(covariance, pose), change @ covariance @ change.T, atol=1e-6)
+    there_and_back = of_inverse(of_inverse(covariance, pose), inverse(pose))
+    np.testing.assert_allclose(there_and_back, covariance, atol=1e-9)
+
+
+@settings(deadline=None)
+@given(covariances())
+def test_the_largest_variance_is_an_eigenvalue(covariance: Matrix) -> None:
+    assert largest_variance(covariance) == pytest.approx(np.linalg.eigvalsh(covariance[:2, :2])[1])
 
 
 @settings(deadline=None)

@@ -37,6 +37,14 @@ def test_pairs_are_the_nearest_that_are_apart_in_time(seed: int, radius: float, 
     assert overlapping_pairs(poses, radius, neighbours) == sorted(expected)
 
 
+def test_pairs_are_of_one_session() -> None:
+    poses = np.column_stack((0.1 * np.arange(12.0), np.zeros(12), np.zeros(12)))
+    sessions = np.array([0] * 4 + [4] * 4 + [0] * 4)
+    pairs = overlapping_pairs(poses, 3.0, 6, sessions)
+    assert {(sessions[first], sessions[second]) for first, second in pairs} == {(0, 0), (4, 4)}
+    assert any(first < 4 and second >= 8 for first, second in pairs)
+
+
 def test_heading_counts_the_short_way_round() -> None:
     poses = np.array([pose(0, 0, 3.1), pose(0.5, 0, 1.0), pose(9, 9, 0), pose(9, 7, 0), pose(0.2, 0, -3.1)])
     assert overlapping_pairs(poses, 1.0, 1) == [(0, 4)]

@@ -109,10 +109,18 @@ def test_surrounding_keeps_the_stretch_and_takes_the_nearest_others() -> None:
     poses = np.array(
         [pose(float(i), 0.0, 0.0) for i in range(20)] + [pose(5.2, 0.1, 0.0), pose(5.0, 50.0, 0)]
     )
-    assert surrounding(poses, 5, 6, 3.0, 7).tolist() == [3, 4, 5, 6, 7, 8, 20]
-    assert surrounding(poses, 5, 6, 3.0, 3).tolist() == [3, 4, 5, 6, 7, 8]
-    assert 21 not in surrounding(poses, 5, 6, 3.0, 50)
-    assert surrounding(poses, 0, 1, 0.1, 50).tolist() == [0, 1, 2, 3]
+    one = np.zeros(len(poses), dtype=np.int64)
+    assert surrounding(poses, one, 5, 6, 3.0, 7).tolist() == [3, 4, 5, 6, 7, 8, 20]
+    assert surrounding(poses, one, 5, 6, 3.0, 3).tolist() == [3, 4, 5, 6, 7, 8]
+    assert 21 not in surrounding(poses, one, 5, 6, 3.0, 50)
+    assert surrounding(poses, one, 0, 1, 0.1, 50).tolist() == [0, 1, 2, 3]
+
+
+def test_surrounding_is_of_the_same_session() -> None:
+    poses = np.array([pose(0.1 * i, 0.0, 0.0) for i in range(20)])
+    sessions = np.array([0] * 6 + [6] * 10 + [0] * 4)
+    assert surrounding(poses, sessions, 4, 5, 3.0, 20).tolist() == [0, 1, 2, 3, 4, 5, 16, 17, 18, 19]
+    assert surrounding(poses, sessions, 6, 9, 3.0, 20).tolist() == list(range(6, 16))
 
 
 def test_scans_that_were_disturbed_are_matched_back(rng: np.random.Generator) -> None:
@@ -128,6 +136,7 @@ def test_scans_that_were_disturbed_are_matched_back(rng: np.random.Generator) ->
         create("hide"),
         points,
         keyframes,
+        np.zeros(len(keyframes), dtype=np.int64),
         scans,
         anchors // 2,
         disturbed,
@@ -155,6 +164,7 @@ def test_a_scan_that_sees_nothing_known_stays_where_it_was() -> None:
         create("hide"),
         known[:1],
         office.poses[:1],
+        np.zeros(1, dtype=np.int64),
         [known[0], blank],
         np.zeros(2, dtype=np.int64),
         np.array([np.zeros(3), relative]),
@@ -182,6 +192,7 @@ def test_a_person_who_walks_along_does_not_draw_a_scan_away() -> None:
         create("hide"),
         [seen_from(0.0)],
         np.zeros((1, 3)),
+        np.zeros(1, dtype=np.int64),
         [seen_from(0.0).astype(np.float32), seen_from(0.22).astype(np.float32)],
         np.zeros(2, dtype=np.int64),
         np.array([np.zeros(3), relative]),
@@ -200,6 +211,7 @@ def test_what_is_found_at_the_edge_of_the_window_is_not_believed(off: float, bel
         create("hide"),
         [first],
         np.zeros((1, 3)),
+        np.zeros(1, dtype=np.int64),
         [first.astype(np.float32), second.astype(np.float32)],
         np.zeros(2, dtype=np.int64),
         np.zeros((2, 3)),
@@ -224,6 +236,7 @@ def test_scans_are_matched_against_the_keyframes_before_and_after_them() -> None
             create("hide"),
             [scans[k] for k in starts],
             office.poses[starts],
+            np.zeros(4, dtype=np.int64),
             [points.astype(np.float32) for points in scans],
             anchors,
             relatives,
@@ -250,6 +263,7 @@ def test_a_keyframe_that_shows_nothing_of_a_scan_is_no_partner() -> None:
         create("hide"),
         known[:1],
         np.zeros((1, 3)),
+        np.zeros(1, dtype=np.int64),
         [known[0].astype(np.float32), blank.astype(np.float32)],
         np.zeros(2, dtype=np.int64),
         np.zeros((2, 3)),

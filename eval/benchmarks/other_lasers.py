@@ -188,6 +188,27 @@ def delayed(scans: int, log: Recording, _: np.random.Generator) -> Recording:
     return replace(log, scans=late)
 
 
+def interrupted(
+    every: int, length: int, carried: bool, log: Recording, rng: np.random.Generator
+) -> Recording:
+    """A recording that pauses: of every so many scans, so many are missing; ``carried``: odometry does not know."""
+    scans, relations = log.scans, log.relations
+    left = np.ones(len(scans), dtype=np.bool_)
+    for middle in range(every // 2, len(scans) - length - 1, every):
+        first = middle + int(rng.integers(0, every // 4))
+        left[first : first + length] = False
+    numbers = np.flatnonzero(left).tolist()
+    there, kept = scans[0].odometry, [scans[0]]
+    for before, i in pairwise(numbers):
+        if not (carried and i > before + 1):
+            there = compose(there, between(scans[before].odometry, scans[i].odometry))
+        kept.append(replace(scans[i], index=len(kept), odometry=there))
+    known = left[relations.first] & left[relations.second]
+    now = np.cumsum(left) - 1
+    first, second = now[relations.first[known]], now[relations.second[known]]
+    return Recording(kept, Relations(first, second, relations.poses[known]))
+
+
 def none(motion: Pose, _: np.random.Generator) -> Pose:
     """No odometry."""
     return np.zeros(3)
@@ -230,6 +251,11 @@ VARIANTS: dict[str, tuple[str, Variant]] = {
     "held-4": ("odometry with every fourth scan", partial(held, 4)),
     "delayed-1": ("odometry a scan late", partial(delayed, 1)),
     "delayed-3": ("odometry three scans late", partial(delayed, 3)),
+    "paused-30": ("30 scans in 2,000 missing", partial(interrupted, 2000, 30, False)),
+    "paused-100": ("100 scans in 2,000 missing", partial(interrupted, 2000, 100, False)),
+    "carried-10": ("10 in 2,000 missing, carried meanwhile", partial(interrupted, 2000, 10, True)),
+    "carried-100": ("100 in 2,000 missing, carried meanwhile", partial(interrupted, 2000, 100, True)),
+    "carried-often": ("30 in 500 missing, carried meanwhile", partial(interrupted, 500, 30, True)),
     "jumping": ("odometry that jumps every 200 scans", partial(by_odometry, jumping)),
 }
 """What is done to the log, in words and in code."""

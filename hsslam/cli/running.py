@@ -82,6 +82,7 @@ def summary(
         ("dataset", f"{log.info.name}: {metrics['scans']:,} scans, {duration:,.0f} s of driving"),
         ("matcher", f"{metrics['matcher']}: {metrics['matched']:,} of {metrics['scans']:,} scans matched"),
         *([("lost", lost)] if (lost := _lost(metrics)) else []),
+        *([("pauses", pauses)] if (pauses := _pauses(metrics)) else []),
         *([("own parts", own)] if (own := _own_parts(metrics)) else []),
         ("wall time", _wall_time(timings)),
         ("keyframes", f"{metrics['keyframes']:,}"),
@@ -111,6 +112,19 @@ def _lost(metrics: dict[str, Any]) -> str:
         f"{told['guessed']:,} scans (the first: {told['first_guessed']:,}) neither matched nor told of by "
         "odometry: the last motion was taken to go on, which is a guess"
     )
+
+
+def _pauses(metrics: dict[str, Any]) -> str:
+    """What is to be said of a log that the robot did not record in one go; nothing where it did."""
+    told = metrics["statistics"]
+    scans, sessions = told["paused_before"], told["sessions"]
+    if not scans:
+        return ""
+    first = ", ".join(f"{scan:,}" for scan in scans[:3]) + (", ..." if len(scans) > 3 else "")
+    where = f"after {len(scans)} the robot was elsewhere (scan {first}); "
+    if sessions == 1:
+        return where + "it was found again after each"
+    return where + f"{sessions} parts of the log could not be tied together: how they lie is odometry's guess"
 
 
 def _own_parts(metrics: dict[str, Any]) -> str:

@@ -147,6 +147,7 @@ def best_of_lattice(
     counts: NDArray[np.int64],
     turn: float,
     budget: int,
+    least: int,
 ) -> tuple[Pose, int, int]:
     """Find the pose of a lattice where a scan's points are worth most, and prove it.
 
@@ -171,12 +172,14 @@ def best_of_lattice(
         Step in heading (rad); at most what moves the farthest point by a cell.
     budget : int
         Blocks and poses to look at before giving up, about.
+    least : int
+        Poses worth less than this are of no interest: the higher it is, the sooner the search ends.
 
     Returns
     -------
     (Pose, int, int)
         Best pose, its worth, and how many blocks and poses were looked at. With the budget spent, the best of those
-        looked at; the guess, worth -1, if there was no pose among them.
+        looked at; the guess, worth ``least`` - 1, if there was no pose among them.
     """
     n, levels, most = xs.shape[0], blocks.shape[0], int(frame[3])
     rounding = rounding_of(pooled, xs, ys)
@@ -197,7 +200,7 @@ def best_of_lattice(
     tx, ty = (low_x - frame[0]) * frame[2], (low_y - frame[1]) * frame[2]
     us, vs = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
     best = counts.copy()
-    best_worth, evaluations = -1, 0
+    best_worth, evaluations = least - 1, 0
     # A block is named by its lowest pose in steps, and has the level of its parts; the first is the whole lattice.
     heap = push(np.empty((1024, 5)), 0, most * n + 1, 0, 0.0, 0.0, 0.0)
     size = 1

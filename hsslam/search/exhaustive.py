@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import dataclass
 from functools import cached_property
@@ -75,19 +76,32 @@ def lattice_search(
     guess: Pose,
     window: SearchWindow,
     budget: int = sys.maxsize,
+    least: float = 0.0,
 ) -> Proof:
     """Find the best pose of the lattice around a guess: steps of a raster cell, and of a cell's turn.
 
     A cell's turn is the rotation that moves the scan's farthest point by a cell. The bound is of the lattice
     only. With a ``budget`` of blocks and poses spent, nothing is proven: the best of those looked at, or the guess.
+    So it is, with a fitness of 0, where no pose has one of ``least``.
     """
     turn = cell_turn(fitness)
     cell = 1.0 / fitness.frame[2]
     counts = np.floor(window.half / np.array([cell, cell, turn]) + 1e-9).astype(np.int64)
+    floor = math.ceil(least * float(fitness.frame[3]) * fitness.count)
     pose, worth, evaluations = best_of_lattice(
-        reference.pooled, _SIDES, _BLOCKS, fitness.frame, fitness.xs, fitness.ys, guess, counts, turn, budget
+        reference.pooled,
+        _SIDES,
+        _BLOCKS,
+        fitness.frame,
+        fitness.xs,
+        fitness.ys,
+        guess,
+        counts,
+        turn,
+        budget,
+        floor,
     )
-    share = float(fitness.share(max(worth, 0)))
+    share = float(fitness.share(worth)) if worth >= floor else 0.0
     return Proof(pose, share, share if evaluations < budget else 1.0, evaluations)
 
 

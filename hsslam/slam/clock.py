@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 RECENT = 100
 """Scans over which the usual interval is averaged."""
 
@@ -13,6 +15,13 @@ SHORT = 0.5
 
 DOUBTED = 30
 """Scans for which stamps are doubted once one was late."""
+
+
+PAUSE = 5.0
+PAUSE_SECONDS = 1.0
+PAUSE_INTERVALS = 10
+"""A recording paused where stamps go on by more than so many usual intervals and seconds, or so many seconds back; what
+is usual is known after so many."""
 
 
 class ScanClock:
@@ -41,6 +50,15 @@ class ScanClock:
     def steady(self, stamp: float) -> bool:
         """Whether neither the scan of this stamp nor any of the last was stamped late."""
         return self._doubted == 0 and not self._late(stamp - self._last)
+
+    def paused(self, stamp: float) -> bool:
+        """Whether the recording paused before a scan, or began anew with it."""
+        interval, least = stamp - self._last, max(PAUSE * self._usual, PAUSE_SECONDS)
+        return self._intervals >= PAUSE_INTERVALS and (interval > least or interval < -least)
+
+    def pause(self, stamp: float) -> float:
+        """Length of a pause before a scan (s): infinite if stamps go back."""
+        return stamp - self._last if stamp > self._last else math.inf
 
     def since_last(self, stamp: float) -> float:
         """Time (s) from the last scan to this, or the usual time where stamps are not steady; 0 if unknown."""

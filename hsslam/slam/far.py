@@ -46,13 +46,20 @@ class FarSearch:
 
     def best(self, points: Points, guess: Pose, window: SearchWindow) -> Pose:
         """The pose of a window around ``guess`` where the (N, 2) points of a scan fit best, to within a cell."""
+        return self.look(points, guess, window)[0]
+
+    def look(
+        self, points: Points, guess: Pose, window: SearchWindow, least: float = 0.0
+    ) -> tuple[Pose, float]:
+        """As `best`, and how well they fit there, in [0, 1]: the guess and 0 if nowhere as well as ``least``."""
         points = _in_range(points)
         if len(points) == 0 or len(self._reference.points) == 0:
-            return guess.copy()
+            return guess.copy(), 0.0
         fitness = HitFitness.of(self._reference.raster, points, MOST_POINTS)
-        pose = lattice_search(self._reference, fitness, guess, window, BUDGET).pose.copy()
+        found = lattice_search(self._reference, fitness, guess, window, BUDGET, least)
+        pose = found.pose.copy()
         pose[2] = wrap(pose[2])
-        return pose
+        return pose, found.fitness
 
     def elsewhere(
         self, points: Points, answer: Pose, window: SearchWindow, apart: SearchWindow

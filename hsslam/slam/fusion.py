@@ -113,3 +113,18 @@ def is_positive_definite(matrix: NDArray[np.float64]) -> bool:
     second = a * d - b * b
     third = a * (d * f - e * e) - b * (b * f - e * c) + c * (b * e - d * c)
     return bool(a > 0.0 and second > 0.0 and third > 0.0)
+
+
+def largest_variance(covariance: NDArray[np.float64]) -> float:
+    """Variance of the position along the direction in which it is least known (m^2), of a (3, 3) covariance."""
+    mean = 0.5 * (covariance[0, 0] + covariance[1, 1])
+    return float(mean + math.hypot(0.5 * (covariance[0, 0] - covariance[1, 1]), covariance[0, 1]))
+
+
+def of_inverse(covariance: NDArray[np.float64], pose: Pose) -> NDArray[np.float64]:
+    """Covariance (3, 3) of the inverse of a pose that has a given one: the first seen from the second."""
+    x, y, theta = pose
+    c, s = math.cos(theta), math.sin(theta)
+    change = np.array([[-c, -s, s * x - c * y], [s, -c, c * x + s * y], [0.0, 0.0, -1.0]])
+    inverted: NDArray[np.float64] = change @ covariance @ change.T
+    return inverted

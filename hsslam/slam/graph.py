@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import GraphSection
-from hsslam.se2 import Pose, Poses, between, compose
+from hsslam.se2 import Pose, Poses, between, compose, compose_many
 from hsslam.slam.events import Edge
 from hsslam.slam.factors import GraphError, between_factor, body_covariance, pose2, prior_factor
 from hsslam.slam.fusion import rotated
@@ -81,6 +81,13 @@ class PoseGraph:
         self._poses[self._count] = compose(self._poses[newest], relative)
         self._count += 1
         self.near.add(self._poses[self._count - 1])
+
+    def move(self, moving: NDArray[np.bool_], motion: Pose) -> None:
+        """Move some keyframes (K,) as one, by a pose in the axes of the map: where they lie was not known."""
+        those = self.poses[moving]
+        self.poses[moving] = compose_many(np.tile(motion, (len(those), 1)), those)
+        self._incremental = None
+        self.near.rebuild(self.poses)
 
     def add_edge(self, edge: Edge) -> None:
         """Add a constraint between two keyframes that exist, the earlier one first."""

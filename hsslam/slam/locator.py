@@ -98,6 +98,8 @@ class Expectation:
         Whether odometry's motion is unlike the one before.
     score : float
         What the last scans scored.
+    paused : bool
+        Whether the recording paused: the robot may have been moved meanwhile, and odometry not know of it.
     """
 
     pose: Pose
@@ -106,6 +108,7 @@ class Expectation:
     told: bool
     leaps: bool
     score: float
+    paused: bool = False
 
     def window(self, least: SearchWindow, most: SearchWindow) -> SearchWindow:
         """As far as the truth may be from the expected pose, between two other windows."""
@@ -180,13 +183,14 @@ class Locator:
         with self._stopwatch.measure("track"):
             found = self._match(expected.pose, window)
             cut_off = _cut_off(found, expected, window, self._open_direction(found))
+            cut_off |= expected.paused and found.score < expected.score - USUAL
             if not (cut_off or expected.leaps):
                 found = self._without_passers_by(expected, window, found)
         if cut_off:
             with self._stopwatch.measure("recover"):
                 found = self._look_further(expected, found)
         if expected.told and (
-            _contradicts(found, expected) or self._unusual(found) or self._drawn_back(expected)
+            contradicts(found, expected) or self._unusual(found) or self._drawn_back(expected)
         ):
             with self._stopwatch.measure("recover"):
                 found = self._agree(expected, found)
@@ -198,7 +202,7 @@ class Locator:
                 found = self._steadier(expected, found)
         if self._open_direction(found) is not None:
             found = self._left_open(expected, found)
-        if expected.told and found.score < expected.score - UNFIT and _contradicts(found, expected):
+        if expected.told and found.score < expected.score - UNFIT and contradicts(found, expected):
             found = _unsure(found, expected)
         return replace(found, evaluations=self._evaluations)
 
@@ -378,7 +382,7 @@ def _unsure(result: MatchResult, expected: Expectation) -> MatchResult:
     return replace(result, covariance=result.covariance + np.outer(off, off))
 
 
-def _contradicts(result: MatchResult, expected: Expectation) -> bool:
+def contradicts(result: MatchResult, expected: Expectation) -> bool:
     """Whether a match and the expectation cannot both be right."""
     off = difference(result.pose, expected.pose)
     return result.converged and squared_mahalanobis(off, expected.covariance + result.covariance) > GATE

@@ -17,10 +17,11 @@ from hsslam.matching.results import MatchResult
 from hsslam.se2 import Points, Pose, Poses, between, compose, inverse, wrap
 from hsslam.slam.events import LoopChecked
 from hsslam.slam.far import NEAR, FarSearch
-from hsslam.slam.fusion import rotated, squared_mahalanobis
+from hsslam.slam.fusion import largest_variance, rotated, squared_mahalanobis
 from hsslam.slam.graph import PoseGraph
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.recovery import best_elsewhere
+from hsslam.slam.sessions import Sessions
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import merge
 from hsslam.slam.windows import foreseen_window, match_within, search_window
@@ -92,8 +93,8 @@ class LoopCloser:
         self._tile = search_window(config.tracker.window)
         self._places: dict[int, _Place] = {}
 
-    def candidates(self, graph: PoseGraph) -> list[Candidate]:
-        """Keyframes worth trying against the newest one, nearest first, not two of the same place."""
+    def candidates(self, graph: PoseGraph, sessions: Sessions) -> list[Candidate]:
+        """Keyframes of its session worth trying against the newest, nearest first, not two of the same place."""
         rules = self._config.loops
         newest = len(graph) - 1
         if not rules.enabled or newest % rules.every or newest <= rules.min_gap:
@@ -101,6 +102,9 @@ class LoopCloser:
         with self._stopwatch.measure("candidates"):
             farthest = rules.radius + 2.0 * self._farthest.half_x
             near, distances = graph.near.of(graph.poses[newest], newest - rules.min_gap, farthest, NEAREST)
+            if not sessions.single:
+                own = ~sessions.foreign(newest)[near]
+                near, distances = near[own], distances[own]
             # Those within the radius are candidates however well they are known; mostly there are enough of them.
             inside = distances <= rules.radius
             targets = self._apart(near[inside])
@@ -128,7 +132,12 @@ class LoopCloser:
         return np.array(chosen, dtype=np.int64)
 
     def match(
-        self, candidate: Candidate, points: Sequence[Points], poses: Poses, known: LoopChecked | None = None
+        self,
+        candidate: Candidate,
+        points: Sequence[Points],
+        poses: Poses,
+        sessions: Sessions,
+        known: LoopChecked | None = None,
     ) -> LoopChecked:
         """Match the newest keyframe against the submap around a candidate; the verdict is still open.
 
@@ -137,7 +146,7 @@ class LoopCloser:
         """
         first, second = candidate.first, len(poses) - 1
         with self._stopwatch.measure("loops"):
-            place = self._place(first, points, poses)
+            place = self._place(first, points, poses, sessions)
             guess = between(poses[first], poses[second])
             if known is None:
                 known = self._match(candidate, second, points[second], place, guess)
@@ -163,10 +172,12 @@ class LoopCloser:
         """Let go of the prepared submaps; those that are wanted again are prepared again."""
         self._places.clear()
 
-    def ambiguity(self, loop: LoopChecked, points: Sequence[Points], poses: Poses) -> float:
+    def ambiguity(
+        self, loop: LoopChecked, points: Sequence[Points], poses: Poses, sessions: Sessions
+    ) -> float:
         """Score of the best answer elsewhere in the window of the search, over that of the loop's own answer."""
         with self._stopwatch.measure("ambiguity"):
-            place = self._place(loop.first, points, poses)
+            place = self._place(loop.first, points, poses, sessions)
             answer = compose(place.of(loop.first), loop.relative)
             scan = points[loop.second]
             rng = generator(self._config.seed, Purpose.AMBIGUITY, loop.first, loop.second)
@@ -217,18 +228,19 @@ class LoopCloser:
             converged=result.converged,
         )
 
-    def _place(self, first: int, points: Sequence[Points], poses: Poses) -> _Place:
+    def _place(self, first: int, points: Sequence[Points], poses: Poses, sessions: Sessions) -> _Place:
         size = self._config.loops.submap_size
         step = max(size // 2, 1)
         number = first // step
         place = self._places.pop(number, None)
         # With a small min_gap, a submap made when the log was young may end before a later candidate.
-        if place is None or first >= place.first + len(place.poses):
+        if place is None or not place.first <= first < place.first + len(place.poses):
             middle = number * step + step // 2
             low = max(middle - size // 2, 0)
             high = min(middle + size // 2 + 1, len(poses) - 1)
             low, high = min(low, first), max(high, first + 1)
-            origin = poses[min(middle, high - 1)].copy()
+            low, high = sessions.around(first, low, high)
+            origin = poses[min(max(middle, low), high - 1)].copy()
             reference = self._matcher.prepare(merge(points[low:high], poses[low:high], origin))
             place = _Place(reference, origin, low, poses[low:high].copy())
         self._places[number] = place
@@ -242,12 +254,7 @@ class LoopCloser:
             return "the matcher did not converge inside the window"
         if loop.score < rules.min_score:
             return f"score {loop.score:.2f} below {rules.min_score:.2f}"
-        largest = math.sqrt(_largest_variance(loop.covariance))
+        largest = math.sqrt(largest_variance(loop.covariance))
         if largest > rules.max_std:
             return f"standard deviation {largest:.2f} m above {rules.max_std:.2f} m"
         return ""
-
-
-def _largest_variance(covariance: NDArray[np.float64]) -> float:
-    mean = 0.5 * (covariance[0, 0] + covariance[1, 1])
-    return float(mean + math.hypot(0.5 * (covariance[0, 0] - covariance[1, 1]), covariance[0, 1]))

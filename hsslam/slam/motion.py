@@ -80,6 +80,18 @@ class MotionModel:
         """Whether odometry's motion to a scan is unlike the one before: wheels slip, messages come late."""
         return way(self._last_step, between(self._odometry, scan.odometry)) > LEAP
 
+    def paused(self, scan: LaserScan) -> bool:
+        """Whether the recording paused before a scan, or its stamp was late."""
+        return self._clock.paused(scan.stamp)
+
+    def pause(self, scan: LaserScan) -> float:
+        """How long the recording paused before a scan (s): infinite if stamps go back."""
+        return self._clock.pause(scan.stamp)
+
+    def surely_paused(self, scan: LaserScan) -> bool:
+        """Whether the recording paused before a scan, and no stamp was late for long."""
+        return self._clock.paused(scan.stamp) and self._clock.steady(scan.stamp)
+
     def _held(self, scan: LaserScan) -> bool:
         """Whether odometry says the same as for the last scan, or said so then, although the robot moved."""
         return way(np.zeros(3), self._last_motion) > MOVING and (

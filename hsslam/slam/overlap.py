@@ -27,18 +27,25 @@ SPREAD = 2
 """Keyframes between two that are matched with the same third, at least: neighbours in time tell the same."""
 
 
-def overlapping_pairs(poses: Poses, radius: float, neighbours: int) -> list[tuple[int, int]]:
+def overlapping_pairs(
+    poses: Poses, radius: float, neighbours: int, sessions: NDArray[np.int64] | None = None
+) -> list[tuple[int, int]]:
     """Pairs ``first < second`` of keyframes within ``radius`` (m): up to ``neighbours`` earlier ones of each.
+
+    Only those of the same session (K,), where there are several.
 
     The nearest come first; of keyframes that follow one another only every other is taken, so that all visits
     to a place are tied together. Consecutive keyframes are no pair: they have a constraint.
     """
-    pairs = nearest_apart(poses, radius, neighbours, SPREAD)
+    one = np.zeros(len(poses), dtype=np.int64) if sessions is None else sessions
+    pairs = nearest_apart(poses, one, radius, neighbours, SPREAD)
     return sorted(zip(pairs[:, 0].tolist(), pairs[:, 1].tolist(), strict=True))
 
 
 @kernel
-def nearest_apart(poses: Poses, radius: float, most: int, spread: int) -> NDArray[np.int64]:
+def nearest_apart(
+    poses: Poses, sessions: NDArray[np.int64], radius: float, most: int, spread: int
+) -> NDArray[np.int64]:
     """Pairs (P, 2), in the order of their second: ``most`` of each at most, no two firsts of it nearer than ``spread``.
 
     One second at a time: of a place that was visited n times there are n squared pairs, too many to hold.
@@ -59,7 +66,7 @@ def nearest_apart(poses: Poses, radius: float, most: int, spread: int) -> NDArra
             if first >= second - 1:
                 break
             distance = math.hypot(poses[first, 0] - x, poses[first, 1] - y)
-            if distance <= radius:
+            if distance <= radius and sessions[first] == sessions[second]:
                 near[kept] = first
                 costs[kept] = distance + 0.5 * abs(wrap(poses[first, 2] - theta))
                 kept += 1

@@ -6,12 +6,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hsslam.config import Config
 from hsslam.errors import DataError
 from hsslam.memory import give_back
 from hsslam.scan import LaserScan
-from hsslam.se2 import Points, Poses, between_many, compose, compose_many
+from hsslam.se2 import Points, Poses, between_many, compose, compose_many, inverse
 from hsslam.slam.events import (
     Edge,
     Event,
@@ -27,9 +28,11 @@ from hsslam.slam.journal import Replay
 from hsslam.slam.loops import LoopCloser
 from hsslam.slam.overlap import match_pairs, moved, overlapping_pairs
 from hsslam.slam.own_parts import OwnParts
+from hsslam.slam.relocalisation import Relocalisation
 from hsslam.slam.rescan import match_scans, worth_a_match
 from hsslam.slam.scan_pairs import match_with_keyframes
 from hsslam.slam.scan_table import ScanTable
+from hsslam.slam.sessions import Sessions, chosen
 from hsslam.slam.smoothing import smooth
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.tracker import TrackedScan, Tracker
@@ -66,6 +69,8 @@ class Slam:
         self._tracker = Tracker(config, self._matcher, self._stopwatch)
         self._closer = LoopCloser(config, loop_matcher, self._stopwatch)
         self._verifier = LoopVerifier(config.loops, self._ambiguity)
+        self._relocalisation = Relocalisation(config, loop_matcher, self._stopwatch)
+        self._sessions = Sessions()
         self._graph: PoseGraph | None = None
         self._keyframes: list[LaserScan] = []
         self._points: list[Points] = []
@@ -75,6 +80,7 @@ class Slam:
         self._matched = 0
         self._evaluations = 0
         self._guessed = 0
+        self._paused_before: list[int] = []
         self._first_guessed: int | None = None
         self._ended = False
 
@@ -125,6 +131,8 @@ class Slam:
             return
         self._tracker.add_keyframe(scan.robot_points, scan.laser_pose, tracked)
         self._graph.add_keyframe(tracked.relative, tracked.covariance)
+        if self._tracker.pause is not None:
+            self._paused_before.append(scan.index)
         self._scans.becomes_keyframe(newest + 1)
         yield self._keep(scan, lasting)
         self._watch(recorded)
@@ -143,8 +151,9 @@ class Slam:
             self._own_parts.outside(points, scan.laser_pose)
             for points, scan in zip(self._points, self._keyframes, strict=True)
         ]
-        lasers = [scan.laser_pose for scan in self._keyframes]
-        self._tracker.relearn(self._points, lasers, poses)
+        start = self._sessions.start(len(poses) - 1)
+        lasers = [scan.laser_pose for scan in self._keyframes[start:]]
+        self._tracker.relearn(self._points[start:], lasers, poses[start:])
         self._closer.release()
 
     def finish(self, last: bool = False) -> Iterator[Event]:
@@ -163,9 +172,11 @@ class Slam:
         """
         self._require_open()
         self._ended = last
+        graph = self._require_graph()
+        for session in self._sessions.split()[1:]:
+            yield from self._look_again(graph, session)
         if last:
             del self._tracker  # its submaps are of use to the next scan only
-        graph = self._require_graph()
         self._forget_own_parts()
         yield from self._settle(self._verifier.close())
         self._closer.release()
@@ -176,7 +187,8 @@ class Slam:
             with self._stopwatch.measure("final"):
                 rules = self._config.graph
                 poses = graph.poses.copy()
-                pairs = overlapping_pairs(poses, rules.overlap_radius, rules.overlap_neighbours)
+                sessions = self._sessions.numbers
+                pairs = overlapping_pairs(poses, rules.overlap_radius, rules.overlap_neighbours, sessions)
                 edges = match_pairs(self._config, self._matcher, self._points, poses, pairs, stage)
                 graph.edges = [edge for edge in graph.edges if edge.kind != "overlap"]
                 for edge in edges:
@@ -198,17 +210,22 @@ class Slam:
 
     def _forget_passers_by(self, poses: Poses) -> None:
         """Leave out, of all points, those in what turned out to be free: who walks ahead hides it while driving."""
-        space = FreeSpace.seen_by(self._points, [scan.laser_pose for scan in self._keyframes], poses)
-        self._points = [space.outside(p, pose) for p, pose in zip(self._points, poses, strict=True)]
+        lasers = [scan.laser_pose for scan in self._keyframes]
         scans = self._scans
-        for i, pose in enumerate(compose_many(poses[scans.anchors], scans.relatives)):
-            lasting = space.outside(scans.points[i].astype(np.float64), pose)
-            scans.points[i] = lasting.astype(np.float32)
+        scan_poses = compose_many(poses[scans.anchors], scans.relatives)
+        for members in self._sessions.split():
+            space = FreeSpace.seen_by(chosen(self._points, members), chosen(lasers, members), poses[members])
+            for k in members.tolist():
+                self._points[k] = space.outside(self._points[k], poses[k])
+            for i in np.flatnonzero(np.isin(scans.anchors, members)).tolist():
+                lasting = space.outside(scans.points[i].astype(np.float64), scan_poses[i])
+                scans.points[i] = lasting.astype(np.float32)
 
     def _rescan(self, graph: PoseGraph, last: bool) -> None:
         """Match every scan against the finished map and its neighbours, and hang it on its keyframe anew."""
         scans, config, matcher = self._scans, self._config, self._matcher
-        known = (self._points, graph.poses, scans.points, scans.anchors, scans.relatives)
+        sessions = self._sessions.numbers
+        known = (self._points, graph.poses, sessions, scans.points, scans.anchors, scans.relatives)
         pairs = match_with_keyframes(config, matcher, *known)
         wanted = worth_a_match(scans.anchors, pairs.partners(len(scans)))
         found, covariances, matched = match_scans(config, matcher, *known, wanted)
@@ -245,6 +262,8 @@ class Slam:
             statistics={
                 "evaluations": self._evaluations,
                 "guessed": self._guessed,
+                "paused_before": list(self._paused_before),
+                "sessions": len(self._sessions.split()),
                 "first_guessed": self._first_guessed,
                 "own_parts_deg": self._own_parts.degrees,
             },
@@ -260,15 +279,39 @@ class Slam:
         graph = self._require_graph()
         second = len(graph) - 1
         settled = self._verifier.expire(second)
-        for candidate in self._closer.candidates(graph):
+        for candidate in self._closer.candidates(graph, self._sessions):
             known = self._replay.loops.get((candidate.first, second))
-            loop = self._closer.match(candidate, self._points, graph.poses, known)
+            loop = self._closer.match(candidate, self._points, graph.poses, self._sessions, known)
             self._evaluations += loop.evaluations
             settled += self._verifier.judge(loop, graph.poses)
         yield from self._settle(settled)
+        if not self._sessions.single:
+            yield from self._relocalise(graph, second)
         if graph.wants_update:
             with self._stopwatch.measure("graph"):
                 graph.update()
+
+    def _relocalise(self, graph: PoseGraph, keyframe: int) -> Iterator[Event]:
+        """Look for a keyframe in the sessions that it is not in, and tie the one that it is found in to its own."""
+        loops = self._relocalisation.look(
+            keyframe, self._points, graph.poses, self._sessions, self._tracker.usual_score
+        )
+        if not loops:
+            return
+        newest = loops[-1]
+        there = compose(graph.poses[newest.first], newest.relative)
+        motion = compose(there, inverse(graph.poses[newest.second]))
+        moving = self._sessions.join(newest.first, newest.second)
+        graph.move(moving, motion if moving[newest.second] else inverse(motion))
+        self._closer.release()
+        yield from self._settle(loops)
+
+    def _look_again(self, graph: PoseGraph, session: NDArray[np.int64]) -> Iterator[Event]:
+        """Look for a session's keyframes where the robot has been since."""
+        for keyframe in session.tolist():
+            if self._sessions.numbers[keyframe] != session[0]:
+                return
+            yield from self._relocalise(graph, keyframe)
 
     def _settle(self, loops: list[LoopChecked]) -> Iterator[Event]:
         for loop in loops:
@@ -279,7 +322,7 @@ class Slam:
             yield loop
 
     def _ambiguity(self, loop: LoopChecked) -> float:
-        return self._closer.ambiguity(loop, self._points, self._require_graph().poses)
+        return self._closer.ambiguity(loop, self._points, self._require_graph().poses, self._sessions)
 
     def _optimise(self, stage: str) -> Optimised:
         graph = self._require_graph()
@@ -324,6 +367,7 @@ class Slam:
         )
 
     def _keep(self, scan: LaserScan, lasting: Points) -> KeyframeAdded:
+        self._sessions.add(self._tracker.pause)
         self._keyframes.append(replace(scan))  # a copy, without the points that a scan remembers once asked
         self._points.append(lasting)
         newest = len(self._keyframes) - 1

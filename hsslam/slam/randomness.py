@@ -19,6 +19,7 @@ class Purpose(IntEnum):
     AMBIGUITY = 3
     SCAN = 4
     PAIR = 5
+    RELOCALISE = 6
 
 
 _WORD = 2**64

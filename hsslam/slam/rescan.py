@@ -38,10 +38,13 @@ ENOUGH_PARTNERS = 2
 """Scans that were matched with this many others need the map less."""
 
 
-def surrounding(poses: Poses, first: int, last: int, radius: float, most: int) -> NDArray[np.int64]:
+def surrounding(
+    poses: Poses, sessions: NDArray[np.int64], first: int, last: int, radius: float, most: int
+) -> NDArray[np.int64]:
     """Numbers of the keyframes that saw what keyframes ``first`` to ``last`` saw.
 
-    These themselves and the two on either side, then the nearest others within ``radius`` (m), ``most`` in all.
+    These themselves and the two on either side, then the nearest others within ``radius`` (m), ``most`` in all, as far
+    as they are of the same session (K,) as ``first``.
     """
     middle = poses[(first + last) // 2]
     low, high = max(first - 2, 0), min(last + 3, len(poses))
@@ -50,6 +53,8 @@ def surrounding(poses: Poses, first: int, last: int, radius: float, most: int) -
     turned = np.abs((offsets[:, 2] + math.pi) % (2 * math.pi) - math.pi)
     cost = np.hypot(offsets[:, 0], offsets[:, 1]) + 0.5 * turned
     cost[low:high] = np.inf
+    cost[sessions != sessions[first]] = np.inf
+    own = own[sessions[own] == sessions[first]]
     others = np.argsort(cost, kind="stable")[: max(most - len(own), 0)]
     return np.sort(np.concatenate((own, others[cost[others] <= radius])))
 
@@ -77,6 +82,7 @@ def match_scans(
     matcher: Matcher[Any],
     keyframe_points: Sequence[Points],
     poses: Poses,
+    sessions: NDArray[np.int64],
     scans: Sequence[NDArray[np.float32]],
     anchors: NDArray[np.int64],
     relatives: Poses,
@@ -90,8 +96,8 @@ def match_scans(
         Its ``graph`` section and its seed.
     matcher : Matcher
         The tracker's.
-    keyframe_points, poses : sequence, Poses
-        Of the keyframes, as optimised.
+    keyframe_points, poses, sessions : sequence, Poses, int64 (K,)
+        Of the keyframes; poses as optimised.
     scans : sequence of float32 (N_i, 2)
         Returns of every scan in the robot's frame (m).
     anchors : int64 (S,)
@@ -113,13 +119,12 @@ def match_scans(
     matched = np.zeros(len(scans), dtype=np.bool_)
 
     def match_block(number: int) -> None:
-        first = number * BLOCK
-        last = min(first + BLOCK, len(poses)) - 1
+        first, last = blocks[number]
         start, stop = np.searchsorted(anchors, [first, last + 1])
         chosen = start + np.flatnonzero(wanted[start:stop])
         if not len(chosen):
             return
-        around = surrounding(poses, first, last, rules.overlap_radius, rules.rescan_keyframes)
+        around = surrounding(poses, sessions, first, last, rules.overlap_radius, rules.rescan_keyframes)
         origin: Pose = poses[(first + last) // 2].copy()
         origins = np.tile(origin, (len(chosen), 1))
         reference = matcher.prepare(merge([keyframe_points[k] for k in around], poses[around], origin))
@@ -136,10 +141,17 @@ def match_scans(
         found[chosen[good]] = compose_many(origins, results.poses)[good]
         covariances[chosen] = [rotated(covariance, -origin[2]) for covariance in results.covariances]
 
-    blocks = -(-len(poses) // BLOCK)
-    for _ in side_by_side(match_block, blocks, threads_for(matcher, rules.threads)):
+    blocks = _blocks(sessions)
+    for _ in side_by_side(match_block, len(blocks), threads_for(matcher, rules.threads)):
         pass
     return found, covariances, matched
+
+
+def _blocks(sessions: NDArray[np.int64]) -> list[tuple[int, int]]:
+    """The first and the last of every `BLOCK` keyframes in a row that are of one session."""
+    starts = np.flatnonzero(np.diff(sessions, prepend=-1)).tolist()
+    rows = zip(starts, [*starts[1:], len(sessions)], strict=True)
+    return [(i, min(i + BLOCK, stop) - 1) for start, stop in rows for i in range(start, stop, BLOCK)]
 
 
 def _confirmed(

@@ -61,6 +61,7 @@ def match_with_keyframes(
     matcher: Matcher[Any],
     keyframe_points: Sequence[Points],
     poses: Poses,
+    sessions: NDArray[np.int64],
     scans: Sequence[NDArray[np.float32]],
     anchors: NDArray[np.int64],
     relatives: Poses,
@@ -86,8 +87,8 @@ def match_with_keyframes(
 
     def matched(k: int) -> tuple[list[int], Matches]:
         own = starts[k]
-        around = range(starts[max(k - reach, 0)], starts[min(k + reach, len(poses))])
-        others = [i for i in around if i != own]
+        around = np.arange(starts[max(k - reach, 0)], starts[min(k + reach, len(poses))])
+        others = around[(sessions[anchors[around]] == sessions[k]) & (around != own)].tolist()
         if not others:
             return others, Matches.of([])
         guesses = between_many(np.tile(poses[k], (len(others), 1)), tracked[others])

@@ -15,9 +15,10 @@ from hsslam.matching.interface import Matcher
 from hsslam.scan import LaserScan
 from hsslam.se2 import Points, Pose, Poses, between, compose
 from hsslam.slam.fusion import fuse, rotated
-from hsslam.slam.locator import Expectation, Locator
+from hsslam.slam.locator import UNFIT, Expectation, Locator, contradicts
 from hsslam.slam.motion import MotionModel
 from hsslam.slam.randomness import Purpose, generator
+from hsslam.slam.sessions import Pause
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import LocalSubmap
 
@@ -26,6 +27,12 @@ SOONER = 1.0 / 3.0
 
 LEAST_RETURNS = 10
 """Returns that a match must explain to be believed: fewer fit in many a place."""
+
+LEAST_EXTENT = 1.0
+"""Returns within a box of this diagonal (m) do not contradict odometry: a piece of one surface looks like any other."""
+
+ANYWHERE = np.diag([20.0**2, 20.0**2, 1.0])
+"""Covariance (m^2, rad^2) of a motion of which nothing is known."""
 
 FORGETTING = 0.1
 """Share of the newest score in what is usual."""
@@ -63,12 +70,16 @@ class Tracker:
         self._motion = MotionModel(config.graph)
         self._pose: Pose = np.zeros(3)
         self._covariance: NDArray[np.float64] = np.zeros((3, 3))
-        self._usual_score = 1.0
+        self.usual_score = 1.0
+        """What the last scans scored."""
         self._matched = False
         self.motion: Pose = np.zeros(3)
         """Motion predicted from the last scan but one to the last, in the frame of the former."""
         self.noise: NDArray[np.float64] = np.eye(3)
         """Its covariance (3, 3), in the frame of the last scan."""
+
+        self.pause: Pause | None = None
+        """Before the last scan, if that may be from anywhere: it does not fit where it should."""
 
         self.guessed = False
         """Whether nothing told of the last scan's pose: no match was believed, and odometry had not changed."""
@@ -100,11 +111,18 @@ class Tracker:
         noise = rotated(noise, -self._pose[2])
         predicted, prior = compose(self._pose, moved), self._covariance + noise
         tracked = known if known is not None else self._match(scan, points, predicted, prior)
-        self.motion, self.noise = moved, rotated(noise, predicted[2])
         newest = self._submap.newest
+        unfit = not tracked.matched or tracked.score < self.usual_score - UNFIT
+        self.pause = None
+        if unfit and self._motion.paused(scan):
+            noise = ANYWHERE
+            tracked = replace(tracked, relative=between(newest, predicted), covariance=noise, matched=False)
+            self.pause = Pause(tracked.relative, self._motion.pause(scan))
+        else:
+            self.usual_score += FORGETTING * (tracked.score - self.usual_score)
+        self.motion, self.noise = moved, rotated(noise, predicted[2])
         pose, posterior = compose(newest, tracked.relative), rotated(tracked.covariance, -newest[2])
-        self._usual_score += FORGETTING * (tracked.score - self._usual_score)
-        self.guessed = not tracked.matched and self._motion.still(scan)
+        self.guessed = not tracked.matched and self._motion.still(scan) and self.pause is None
         self._motion.observe(scan, between(self._pose, pose), tracked.matched)
         self._pose, self._covariance = pose, posterior
         self._matched = tracked.matched
@@ -116,6 +134,8 @@ class Tracker:
 
     def wants_keyframe(self, tracked: TrackedScan) -> bool:
         """Whether the scan is far enough from the newest keyframe to become one, or sees what the submap lacks."""
+        if self.pause is not None:
+            return True
         x, y, theta = tracked.relative
         rules = self._config.keyframes
         share = 1.0 if tracked.score >= rules.min_score else SOONER
@@ -123,7 +143,13 @@ class Tracker:
         return far or abs(theta) >= share * math.radians(rules.angle_deg)
 
     def add_keyframe(self, points: Points, laser: Pose, tracked: TrackedScan) -> None:
-        """Make the last scan the newest keyframe; its (N, 2) points and its laser are in the robot's frame."""
+        """Make the last scan the newest keyframe; its (N, 2) points and its laser are in the robot's frame.
+
+        A scan that may have been taken anywhere begins a new submap.
+        """
+        if self.pause is not None:
+            self._submap = LocalSubmap(self._matcher, self._config.keyframes.submap_size)
+            self._covariance = np.zeros((3, 3))
         with self._stopwatch.measure("submap"):
             self._submap.add(points, laser, tracked.relative)
         self._stand_on_newest()
@@ -157,14 +183,16 @@ class Tracker:
         self, scan: LaserScan, points: Points, predicted: Pose, prior: NDArray[np.float64]
     ) -> TrackedScan:
         rules = self._config.tracker
-        told = not (self._motion.silent or self._motion.still(scan))
+        paused = self._motion.surely_paused(scan)
+        told = not (paused or self._motion.silent or self._motion.still(scan))
         expected = Expectation(
             pose=predicted,
             covariance=prior,
             repeated=compose(self._pose, self._motion.last_motion),
             told=told,
             leaps=told and self._motion.leaps(scan),
-            score=self._usual_score,
+            score=self.usual_score,
+            paused=paused,
         )
         rng = generator(self._config.seed, Purpose.TRACK, scan.index)
         result = Locator(rules, self._matcher, self._submap.current, points, rng, self._stopwatch).locate(
@@ -172,6 +200,8 @@ class Tracker:
         )
         explained = result.score * len(points)
         matched = result.converged and result.score >= rules.min_score and explained >= LEAST_RETURNS
+        if matched and contradicts(result, expected):
+            matched = float(np.hypot(*np.ptp(points, axis=0))) >= LEAST_EXTENT
         if not matched:
             pose, covariance = predicted, prior
         elif rules.fuse_odometry:

@@ -1,0 +1,367 @@
+"""Where is the robot? Every place of the other sessions is looked at, and what one scan says the next must confirm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from operator import itemgetter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsslam.config import Config
+from hsslam.matching.interface import Matcher, SearchWindow
+from hsslam.se2 import Points, Pose, Poses, between, compose, inverse
+from hsslam.slam.events import LoopChecked
+from hsslam.slam.far import NEAR, FarSearch
+from hsslam.slam.fusion import largest_variance, of_inverse
+from hsslam.slam.randomness import Purpose, generator
+from hsslam.slam.sessions import Sessions
+from hsslam.slam.stopwatch import Stopwatch
+from hsslam.slam.submap import merge
+from hsslam.slam.tracker import ANYWHERE
+from hsslam.slam.windows import differences, match_within, search_window
+
+APART = 2.5
+"""Distance of the places that are looked at (m)."""
+
+AROUND = 3.0
+ALIKE = np.array([1.0, 1.0, math.radians(45.0)])
+MOST_KEYFRAMES = 20
+"""What is known of a place: keyframes within `AROUND` (m) of its middle, one of those that are `ALIKE` (m, m, rad), the
+nearest, so many at most."""
+
+EVERYWHERE = SearchWindow(APART, APART, math.pi)
+"""Around each of them."""
+
+MOST_PLACES = 100
+"""Places that one keyframe is tried in, at most; the next goes on with others."""
+
+PROMISING = 3
+"""Places, those of the coarse search's best answers, in which a keyframe is matched."""
+
+EAGER = 10
+EVERY, SELDOM, PATIENCE = 3, 10, 30
+"""So many keyframes of a session look everywhere, then one of `EVERY`, and of one more after every `PATIENCE` of them,
+of `SELDOM` at most. All are tried where a guess says that they are."""
+
+LIKELY = 0.7
+"""Share of the usual score from which a match is a guess, or confirms one."""
+
+COARSELY = 0.85
+"""Share of that which the coarse search must find."""
+
+SURE = 0.88
+"""Share of the usual score that the matches of a guess must have on average to be believed."""
+
+SPEED, TURN_RATE = 1.5, 1.0
+"""Of a robot, or of who carries it (m/s, rad/s)."""
+
+DRIFT = 0.2
+DRIFT_THETA = math.radians(25.0)
+"""What odometry may be off after a pause that it knows of: share of the way, and heading (rad)."""
+
+MISSES = 2
+"""Keyframes in a row that may fail to confirm a guess."""
+
+SAME_XY = 0.3
+SAME_THETA = math.radians(5.0)
+"""Two guesses this near to one another (m, rad) are one; a match this far from its guess does not confirm it."""
+
+MOST_GUESSES = 10
+"""Guesses that are followed, at most."""
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """What it takes to believe a guess.
+
+    Attributes
+    ----------
+    keyframes : int
+        That must say the same.
+    way, turn : float
+        How far apart two of them are (m, rad), each at least.
+    both : float
+        What `WIDE` of way and turn together come to.
+    """
+
+    keyframes: int
+    way: float
+    turn: float
+    both: float = 0.0
+
+    def fulfilled(self, guess: Guess, poses: Poses) -> bool:
+        """Whether enough keyframes that are far enough apart confirm a guess."""
+        way, turn = guess.spread(poses)
+        enough = len(guess.matches) >= self.keyframes and way >= self.way and turn >= self.turn
+        return enough and way / WIDE[0] + turn / WIDE[1] >= self.both
+
+
+FORESEEN = Confirmation(5, 1.0, 0.0)
+"""The guess is where odometry says, or the robot cannot have been taken farther than `NEARBY`."""
+
+REACHABLE = Confirmation(8, 2.0, math.radians(45.0))
+"""The robot may have been taken there in the time, not farther than `FARTHER`."""
+
+NEARBY, FARTHER = 5.0, 15.0
+"""Metres."""
+
+WIDE = (5.0, math.radians(90.0))
+"""A wide way and a wide turn (m, rad)."""
+
+SOMEWHERE = Confirmation(10, 1.5, math.radians(30.0), 1.5)
+"""Ten metres of one corridor may look just like those of another, or like their own the other way round; they do no
+more where the robot turns off."""
+
+
+@dataclass(eq=False)
+class Guess:
+    """Where the robot's session may lie in another one: what agrees with it, the newest last."""
+
+    matches: list[LoopChecked] = field(default_factory=list)
+    misses: int = 0
+
+    @property
+    def score(self) -> float:
+        """Mean of its matches' scores."""
+        return sum(match.score for match in self.matches) / len(self.matches)
+
+    def foretells(self, keyframe: int, poses: Poses) -> Pose:
+        """Where it says that a keyframe of the robot's session is, among the other session's."""
+        last = self.matches[-1]
+        there = compose(poses[last.first], last.relative)
+        return compose(there, between(poses[last.second], poses[keyframe]))
+
+    def spread(self, poses: Poses) -> tuple[float, float]:
+        """How far apart (m, rad) the keyframes that said so are from the first of them, at most."""
+        off = differences(poses[[match.second for match in self.matches]], poses[self.matches[0].second])
+        return float(np.hypot(off[:, 0], off[:, 1]).max()), float(np.abs(off[:, 2]).max())
+
+
+class Relocalisation:
+    """Looks for one keyframe after another in the sessions that they do not belong to.
+
+    Parameters
+    ----------
+    config : Config
+        Its ``loops`` and ``tracker`` sections and its seed.
+    matcher : Matcher
+        Of loops.
+    stopwatch : Stopwatch
+        Told how long all of it took.
+    """
+
+    def __init__(self, config: Config, matcher: Matcher[Any], stopwatch: Stopwatch) -> None:
+        self._config = config
+        self._matcher = matcher
+        self._stopwatch = stopwatch
+        self._guesses: list[Guess] = []
+        self._next = 0
+
+    def look(
+        self, keyframe: int, points: Sequence[Points], poses: Poses, sessions: Sessions, usual: float
+    ) -> list[LoopChecked]:
+        """Look for a keyframe in the sessions that it does not belong to.
+
+        Parameters
+        ----------
+        keyframe : int
+            One that follows the last that was looked for, or the first of a session.
+        points, poses : sequence of Points, Poses
+            Of every keyframe: (N_i, 2) m in its own frame, and (K, 3).
+        sessions : Sessions
+            Of every keyframe.
+        usual : float
+            What the last scans scored where they were tracked.
+
+        Returns
+        -------
+        list of LoopChecked
+            Once the robot's place is known: loops between keyframes of both sessions that say so, all accepted.
+        """
+        with self._stopwatch.measure("relocalisation"):
+            search = _Search(self._config, self._matcher, keyframe, points, poses, sessions)
+            return self._look(search, usual)
+
+    def _look(self, search: _Search, usual: float) -> list[LoopChecked]:
+        foreign = search.foreign
+        self._guesses = [
+            guess
+            for guess in self._guesses
+            if foreign[guess.matches[-1].first] and not foreign[guess.matches[-1].second]
+        ]
+        for guess in self._guesses:
+            _confirm(guess, search, LIKELY * usual)
+        self._guesses = [guess for guess in self._guesses if guess.misses <= MISSES]
+        own = search.keyframe - search.start
+        if own < EAGER or own % min(max(own // PATIENCE, EVERY), SELDOM) == 0:
+            for match in self._everywhere(search, LIKELY * usual):
+                self._take(match, search.poses)
+        return self._believed(search, SURE * usual)
+
+    def _everywhere(self, search: _Search, least: float) -> list[LoopChecked]:
+        """Matches of the keyframe in the places that look most like what it sees."""
+        places = search.places()
+        if len(places) > MOST_PLACES:
+            start = self._next % len(places)
+            self._next = start + MOST_PLACES
+            places = np.roll(places, -start)[:MOST_PLACES]
+        looked: list[tuple[float, int, Pose]] = []
+        for first in places.tolist():
+            worth_it = looked[-1][0] if len(looked) == PROMISING else COARSELY * least
+            pose, share = search.coarsely(first, worth_it)
+            if share >= worth_it:
+                looked = sorted([*looked, (share, first, pose)], key=itemgetter(0), reverse=True)[:PROMISING]
+        found = [search.match(first, pose) for _, first, pose in looked]
+        return [match for match in found if search.says(match, least)]
+
+    def _take(self, match: LoopChecked, poses: Poses) -> None:
+        """A new guess, unless it says the same as one that there is."""
+        there = compose(poses[match.first], match.relative)
+        for guess in self._guesses:
+            if _near(between(guess.foretells(match.second, poses), there)):
+                return
+        self._guesses.append(Guess([match]))
+        self._guesses.sort(key=lambda guess: (-len(guess.matches), -guess.score))
+        del self._guesses[MOST_GUESSES:]
+
+    def _believed(self, search: _Search, least: float) -> list[LoopChecked]:
+        """The matches of the guess that is right, if that is known."""
+        ranked = sorted(self._guesses, key=lambda guess: -len(guess.matches) * guess.score)
+        if not ranked:
+            return []
+        best, rivals = ranked[0], ranked[1:]
+        rule = _rule(best, search)
+        rivalled = any(2 * len(rival.matches) > len(best.matches) for rival in rivals)
+        if rivalled or best.score < least or not rule.fulfilled(best, search.poses):
+            return []
+        self._guesses = []
+        return [_in_order(match) for match in best.matches]
+
+
+def _in_order(match: LoopChecked) -> LoopChecked:
+    """A match with the earlier keyframe as its first."""
+    if match.first < match.second:
+        return match
+    return replace(
+        match,
+        first=match.second,
+        second=match.first,
+        relative=inverse(match.relative),
+        covariance=of_inverse(match.covariance, match.relative),
+    )
+
+
+def _confirm(guess: Guess, search: _Search, least: float) -> None:
+    """Try the keyframe where a guess says that it is."""
+    foretold = guess.foretells(search.keyframe, search.poses)
+    distances = _distances(search.poses[search.others], foretold)
+    if distances.min() > APART:
+        return  # on ground that the other session does not know, there is nothing to confirm it
+    first = int(search.others[distances.argmin()])
+    place = search.poses[first]
+    match = search.match(first, between(place, foretold))
+    if search.says(match, least) and _near(between(foretold, compose(place, match.relative))):
+        guess.matches.append(match)
+        guess.misses = 0
+    else:
+        guess.misses += 1
+
+
+def _rule(guess: Guess, search: _Search) -> Confirmation:
+    """What has to confirm a guess: the less, the better it agrees with what is known of the pause before."""
+    start, poses, sessions = search.start, search.poses, search.sessions
+    pause = sessions.pauses.get(start)
+    if pause is None or sessions.numbers[start - 1] != sessions.numbers[guess.matches[-1].first]:
+        return SOMEWHERE
+    motion = between(poses[start - 1], guess.foretells(start, poses))
+    moved, off = math.hypot(motion[0], motion[1]), between(pause.motion, motion)
+    reach = SPEED * pause.seconds + SAME_XY
+    way = math.hypot(pause.motion[0], pause.motion[1])
+    foreseen = math.hypot(off[0], off[1]) <= SAME_XY + DRIFT * way and abs(off[2]) <= DRIFT_THETA
+    reachable = moved <= reach and abs(motion[2]) <= TURN_RATE * pause.seconds + SAME_THETA
+    if foreseen or (reachable and reach <= NEARBY):
+        return FORESEEN
+    return REACHABLE if reachable and reach <= FARTHER else SOMEWHERE
+
+
+class _Search:
+    """A keyframe, looked for in places of other sessions than its own."""
+
+    def __init__(
+        self,
+        config: Config,
+        matcher: Matcher[Any],
+        keyframe: int,
+        points: Sequence[Points],
+        poses: Poses,
+        sessions: Sessions,
+    ) -> None:
+        self.keyframe = keyframe
+        self._config = config
+        self._matcher = matcher
+        self._points = points
+        self.sessions = sessions
+        self.poses = poses
+        self.foreign = sessions.foreign(keyframe)
+        self.others = np.flatnonzero(self.foreign)
+        self.start = sessions.start(keyframe)
+
+    def coarsely(self, first: int, least: float) -> tuple[Pose, float]:
+        """Where around another keyframe it fits best, seen from there, and how well, if as well as ``least``."""
+        scan = self._points[self.keyframe]
+        return FarSearch(self._submap(first)).look(scan, np.zeros(3), EVERYWHERE, least)
+
+    def match(self, first: int, guess: Pose) -> LoopChecked:
+        """The keyframe near where ``guess`` says it is, seen from another."""
+        rng = generator(self._config.seed, Purpose.RELOCALISE, first, self.keyframe)
+        tile = search_window(self._config.tracker.window)
+        reference = self._matcher.prepare(self._submap(first))
+        found = match_within(self._matcher, reference, self._points[self.keyframe], guess, NEAR, tile, rng)
+        return LoopChecked(
+            first=first,
+            second=self.keyframe,
+            accepted=True,
+            reason="",
+            relative=found.pose,
+            covariance=found.covariance,
+            score=found.score,
+            evaluations=found.evaluations,
+            converged=found.converged,
+            expected_std=math.sqrt(ANYWHERE[0, 0]),
+        )
+
+    def says(self, match: LoopChecked, least: float) -> bool:
+        """Whether a match has a score of ``least`` and leaves no direction open."""
+        sure = largest_variance(match.covariance) <= self._config.loops.max_std**2
+        return match.converged and match.score >= least and sure
+
+    def places(self) -> NDArray[np.int64]:
+        """Keyframes of other sessions, none within `APART` of another, and all others are of one."""
+        left, chosen = self.others, []
+        while len(left):
+            chosen.append(left[0])
+            left = left[_distances(self.poses[left], self.poses[left[0]]) > APART]
+        return np.array(chosen, dtype=np.int64)
+
+    def _submap(self, first: int) -> Points:
+        own = np.flatnonzero(self.sessions.numbers == self.sessions.numbers[first])
+        distances = _distances(self.poses[own], self.poses[first])
+        near = own[np.argsort(distances, kind="stable")[: np.count_nonzero(distances <= AROUND)]]
+        _, kinds = np.unique(np.round(self.poses[near] / ALIKE), axis=0, return_index=True)
+        chosen = near[np.sort(kinds)[:MOST_KEYFRAMES]]
+        points = [self._points[keyframe] for keyframe in chosen.tolist()]
+        return merge(points, self.poses[chosen], self.poses[first])
+
+
+def _distances(poses: Poses, pose: Pose) -> NDArray[np.float64]:
+    """Distances (N,) of poses (N, 3) from another (m)."""
+    distances: NDArray[np.float64] = np.hypot(poses[:, 0] - pose[0], poses[:, 1] - pose[1])
+    return distances
+
+
+def _near(off: Pose) -> bool:
+    return math.hypot(off[0], off[1]) <= SAME_XY and abs(off[2]) <= SAME_THETA
