@@ -198,3 +198,20 @@ def test_refine_says_how_often_overlapping_keyframes_are_matched_again(tmp_path:
     assert load_config(tmp_path / "r" / "config.yaml").graph.refine_rounds == 0
     refused = hsslam("run", "corridor", "--refine", "-1")
     assert refused.exit_code == 2 and "--refine" in refused.output
+
+
+def test_two_logs_in_a_row_are_two_sessions_of_one_map(tmp_path: Path) -> None:
+    """Nobody says where the second begins; it is found by what it sees."""
+    for name, scans, seed in (("monday", 500, 0), ("tuesday", 500, 2)):
+        out = tmp_path / f"{name}.clf"
+        assert hsslam("convert", "office", out, "--scans", scans, "--seed", seed).exit_code == 0
+    both = tmp_path / "both.clf"
+    both.write_bytes(b"".join((tmp_path / f"{name}.clf").read_bytes() for name in ("monday", "tuesday")))
+    result = hsslam("run", both, "--out", tmp_path / "both")
+    assert result.exit_code == 0, result.output
+    (line,) = [line for line in result.output.splitlines() if line.startswith("pauses")]
+    assert line.split("pauses", 1)[1].strip() == (
+        "after 1 the robot was elsewhere (scan 500); it was found again after each"
+    )
+    told = json.loads((tmp_path / "both" / "metrics.json").read_text())["statistics"]
+    assert (told["paused_before"], told["sessions"]) == ([500], 1)

@@ -60,6 +60,24 @@ def test_the_best_of_the_lattice_is_what_brute_force_finds(room_pair, name) -> N
 
 
 @pytest.mark.parametrize("name", fitness_names())
+def test_what_is_worth_less_than_asked_for_is_not_looked_for(room_pair, name) -> None:
+    first, second, truth = room_pair
+    reference = ExhaustiveReference(first, name, 0.03, 0.025)
+    fitness = reference.fitness_of(second)
+    guess = truth + (0.05, -0.03, 0.02)
+    every = lattice_search(reference, fitness, guess, WINDOW)
+    same = lattice_search(reference, fitness, guess, WINDOW, least=every.fitness - 1e-9)
+    assert same.pose.tolist() == every.pose.tolist()
+    assert (same.fitness, same.bound) == (every.fitness, every.bound)
+    assert same.evaluations <= every.evaluations
+    none = lattice_search(reference, fitness, guess, WINDOW, least=every.fitness + 1e-3)
+    assert none.pose == pytest.approx(guess)
+    assert none.fitness == 0.0
+    assert every.fitness < none.bound < every.fitness + 0.01
+    assert none.evaluations <= same.evaluations
+
+
+@pytest.mark.parametrize("name", fitness_names())
 def test_no_pose_of_the_window_is_above_the_bound(room_pair, name) -> None:
     first, second, truth = room_pair
     reference = ExhaustiveReference(first, name, 0.03, 0.025)

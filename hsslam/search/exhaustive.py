@@ -101,8 +101,10 @@ def lattice_search(
         budget,
         floor,
     )
-    share = float(fitness.share(worth)) if worth >= floor else 0.0
-    return Proof(pose, share, share if evaluations < budget else 1.0, evaluations)
+    found = worth >= floor
+    share = float(fitness.share(worth)) if found else 0.0
+    bound = share if found else least
+    return Proof(pose, share, bound if evaluations < budget else 1.0, evaluations)
 
 
 def window_search(
