@@ -72,6 +72,13 @@ def test_any_matcher_finds_it(office: list[LaserScan]) -> None:
     assert errors(result, OFFICE.poses[left]).max() < 0.06
 
 
+def test_without_loops_nothing_is_tied(office: list[LaserScan]) -> None:
+    scans, _ = interrupted(office[:900], [(300, 560)], carried=True)
+    result = Slam(load_config(overrides=["loops.enabled=false"])).solve(scans)
+    assert result.statistics["sessions"] == 2
+    assert result.loops == []
+
+
 def test_a_pause_at_rest_is_none(office: list[LaserScan]) -> None:
     """Nothing is to be found again where the next scan fits as ever."""
     late = [scan if scan.index < 300 else replace(scan, stamp=scan.stamp + 60.0) for scan in office[:600]]

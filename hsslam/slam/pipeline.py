@@ -285,19 +285,21 @@ class Slam:
             self._evaluations += loop.evaluations
             settled += self._verifier.judge(loop, graph.poses)
         yield from self._settle(settled)
-        if not self._sessions.single:
-            yield from self._relocalise(graph, second)
+        yield from self._relocalise(graph, second)
         if graph.wants_update:
             with self._stopwatch.measure("graph"):
                 graph.update()
 
     def _relocalise(self, graph: PoseGraph, keyframe: int) -> Iterator[Event]:
         """Look for a keyframe in the sessions that it is not in, and tie the one that it is found in to its own."""
+        if self._sessions.single or not self._config.loops.enabled:
+            return
         loops = self._relocalisation.look(
             keyframe, self._points, graph.poses, self._sessions, self._tracker.usual_score
         )
         if not loops:
             return
+        self._evaluations += sum(loop.evaluations for loop in loops)
         newest = loops[-1]
         there = compose(graph.poses[newest.first], newest.relative)
         motion = compose(there, inverse(graph.poses[newest.second]))

@@ -239,7 +239,8 @@ class Relocalisation:
         if rivalled or best.score < least or not rule.fulfilled(best, search.poses):
             return []
         self._guesses = []
-        return [_in_order(match) for match in best.matches]
+        agreeing = len(best.matches) - 1
+        return [_in_order(replace(match, agreeing=agreeing)) for match in best.matches]
 
 
 def _in_order(match: LoopChecked) -> LoopChecked:
