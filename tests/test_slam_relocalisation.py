@@ -136,7 +136,8 @@ def looked_for(numbers: list[int], pause: Pause, *, again: bool = False) -> list
     """
     known = list(range(0, 700, 3))
     truth = OFFICE.poses[[*known, *numbers]]
-    points: list[Points] = [_POINTS[i] for i in (*known, *numbers)]
+    scans = [_SCANS[i] for i in (*known, *numbers)]
+    points: list[Points] = [scan.robot_points for scan in scans]
     poses = truth.copy()
     relocalisation = Relocalisation(Config(), create("hide"), Stopwatch())
     for k in range(len(known), len(truth)):
@@ -147,7 +148,7 @@ def looked_for(numbers: list[int], pause: Pause, *, again: bool = False) -> list
         until = Sessions()
         for i in range(stop):
             until.add(pause if i == len(known) else None)
-        loops = relocalisation.look(k, points[:stop], poses[:stop], until, 0.95)
+        loops = relocalisation.look(k, scans[:stop], points[:stop], poses[:stop], until, 0.95)
         if loops:
             for loop in loops:
                 off = between(between(truth[loop.first], truth[loop.second]), loop.relative)
@@ -158,7 +159,7 @@ def looked_for(numbers: list[int], pause: Pause, *, again: bool = False) -> list
     return []
 
 
-_POINTS = [scan.robot_points for scan in OFFICE.scans()]
+_SCANS = list(OFFICE.scans())
 TURNING = list(range(702, 1000, 3))
 
 

@@ -295,7 +295,12 @@ class Slam:
         if self._sessions.single or not self._config.loops.enabled:
             return
         loops = self._relocalisation.look(
-            keyframe, self._points, graph.poses, self._sessions, self._tracker.usual_score
+            keyframe,
+            self._keyframes,
+            self._points,
+            graph.poses,
+            self._sessions,
+            self._tracker.usual_score,
         )
         if not loops:
             return

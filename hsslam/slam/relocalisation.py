@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import Any
 
@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 
 from hsslam.config import Config
 from hsslam.matching.interface import Matcher, SearchWindow
-from hsslam.se2 import Points, Pose, Poses, between, compose, inverse
+from hsslam.scan import LaserScan
+from hsslam.se2 import Points, Pose, Poses, between, between_many, compose, inverse
 from hsslam.slam.events import LoopChecked
 from hsslam.slam.far import NEAR, FarSearch
+from hsslam.slam.free_space import FreeSpace
 from hsslam.slam.fusion import largest_variance, of_inverse
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.sessions import Sessions
@@ -47,14 +49,21 @@ EVERY, SELDOM, PATIENCE = 3, 10, 30
 """So many keyframes of a session look everywhere, then one of `EVERY`, and of one more after every `PATIENCE` of them,
 of `SELDOM` at most. All are tried where a guess says that they are."""
 
-LIKELY = 0.7
-"""Share of the usual score from which a match is a guess, or confirms one."""
+COARSELY = 0.55
+"""Share of the usual score that the coarse search must find."""
 
-COARSELY = 0.85
-"""Share of that which the coarse search must find."""
+EXPLAINED = 0.5
+"""Share of a keyframe's returns that a match must explain."""
 
-SURE = 0.88
-"""Share of the usual score that the matches of a guess must have on average to be believed."""
+LIKELY = 0.8
+"""Share of the usual score that it must explain of the returns that lie where the place is known."""
+
+CONFLICTING = 0.08
+"""Share of its returns that may lie where the place is empty: those of people; a false match has mostly more."""
+
+SURE, MOSTLY = 0.9, 0.7
+"""What the matches of a guess must come to on average to be believed: share of the usual score as for `LIKELY`, and of
+all returns."""
 
 SPEED, TURN_RATE = 1.5, 1.0
 """Of a robot, or of who carries it (m/s, rad/s)."""
@@ -112,21 +121,41 @@ NEARBY, FARTHER = 5.0, 15.0
 WIDE = (5.0, math.radians(90.0))
 """A wide way and a wide turn (m, rad)."""
 
-SOMEWHERE = Confirmation(10, 1.5, math.radians(30.0), 1.5)
+SOMEWHERE = Confirmation(10, 1.2, math.radians(30.0), 1.5)
 """Ten metres of one corridor may look just like those of another, or like their own the other way round; they do no
 more where the robot turns off."""
 
 
-@dataclass(eq=False)
-class Guess:
-    """Where the robot's session may lie in another one: what agrees with it, the newest last."""
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """A match, and the share of the returns that it explains of those that lie where the place is known."""
 
-    matches: list[LoopChecked] = field(default_factory=list)
-    misses: int = 0
+    match: LoopChecked
+    fit: float
+
+
+class Guess:
+    """Where the robot's session may lie in another one: the matches that say so, the newest last."""
+
+    def __init__(self, first: Answer) -> None:
+        self.matches = [first.match]
+        self.misses = 0
+        self._fits = [first.fit]
+
+    def add(self, answer: Answer) -> None:
+        """One more that says so."""
+        self.matches.append(answer.match)
+        self._fits.append(answer.fit)
+        self.misses = 0
+
+    @property
+    def fit(self) -> float:
+        """Mean of its answers'."""
+        return sum(self._fits) / len(self._fits)
 
     @property
     def score(self) -> float:
-        """Mean of its matches' scores."""
+        """Mean of its matches'."""
         return sum(match.score for match in self.matches) / len(self.matches)
 
     def foretells(self, keyframe: int, poses: Poses) -> Pose:
@@ -162,7 +191,13 @@ class Relocalisation:
         self._next = 0
 
     def look(
-        self, keyframe: int, points: Sequence[Points], poses: Poses, sessions: Sessions, usual: float
+        self,
+        keyframe: int,
+        keyframes: Sequence[LaserScan],
+        points: Sequence[Points],
+        poses: Poses,
+        sessions: Sessions,
+        usual: float,
     ) -> list[LoopChecked]:
         """Look for a keyframe in the sessions that it does not belong to.
 
@@ -170,8 +205,8 @@ class Relocalisation:
         ----------
         keyframe : int
             One that follows the last that was looked for, or the first of a session.
-        points, poses : sequence of Points, Poses
-            Of every keyframe: (N_i, 2) m in its own frame, and (K, 3).
+        keyframes, points, poses : sequence of LaserScan, sequence of Points, Poses
+            All keyframes, their (N_i, 2) points (m), each in its own frame, and where they are, (K, 3).
         sessions : Sessions
             Of every keyframe.
         usual : float
@@ -183,7 +218,7 @@ class Relocalisation:
             Once the robot's place is known: loops between keyframes of both sessions that say so, all accepted.
         """
         with self._stopwatch.measure("relocalisation"):
-            search = _Search(self._config, self._matcher, keyframe, points, poses, sessions)
+            search = _Search(self._config, self._matcher, keyframe, keyframes, points, poses, sessions)
             return self._look(search, usual)
 
     def _look(self, search: _Search, usual: float) -> list[LoopChecked]:
@@ -194,15 +229,15 @@ class Relocalisation:
             if foreign[guess.matches[-1].first] and not foreign[guess.matches[-1].second]
         ]
         for guess in self._guesses:
-            _confirm(guess, search, LIKELY * usual)
+            _confirm(guess, search, usual)
         self._guesses = [guess for guess in self._guesses if guess.misses <= MISSES]
         own = search.keyframe - search.start
         if own < EAGER or own % min(max(own // PATIENCE, EVERY), SELDOM) == 0:
-            for match in self._everywhere(search, LIKELY * usual):
-                self._take(match, search.poses)
-        return self._believed(search, SURE * usual)
+            for answer in self._everywhere(search, usual):
+                self._take(answer, search.poses)
+        return self._believed(search, usual)
 
-    def _everywhere(self, search: _Search, least: float) -> list[LoopChecked]:
+    def _everywhere(self, search: _Search, usual: float) -> list[Answer]:
         """Matches of the keyframe in the places that look most like what it sees."""
         places = search.places()
         if len(places) > MOST_PLACES:
@@ -211,32 +246,33 @@ class Relocalisation:
             places = np.roll(places, -start)[:MOST_PLACES]
         looked: list[tuple[float, int, Pose]] = []
         for first in places.tolist():
-            worth_it = looked[-1][0] if len(looked) == PROMISING else COARSELY * least
+            worth_it = looked[-1][0] if len(looked) == PROMISING else COARSELY * usual
             pose, share = search.coarsely(first, worth_it)
             if share >= worth_it:
                 looked = sorted([*looked, (share, first, pose)], key=itemgetter(0), reverse=True)[:PROMISING]
-        found = [search.match(first, pose) for _, first, pose in looked]
-        return [match for match in found if search.says(match, least)]
+        found = [search.match(first, pose, usual) for _, first, pose in looked]
+        return [answer for answer in found if answer is not None]
 
-    def _take(self, match: LoopChecked, poses: Poses) -> None:
+    def _take(self, answer: Answer, poses: Poses) -> None:
         """A new guess, unless it says the same as one that there is."""
+        match = answer.match
         there = compose(poses[match.first], match.relative)
         for guess in self._guesses:
             if _near(between(guess.foretells(match.second, poses), there)):
                 return
-        self._guesses.append(Guess([match]))
-        self._guesses.sort(key=lambda guess: (-len(guess.matches), -guess.score))
+        self._guesses.append(Guess(answer))
+        self._guesses.sort(key=lambda guess: (-len(guess.matches), -guess.fit))
         del self._guesses[MOST_GUESSES:]
 
-    def _believed(self, search: _Search, least: float) -> list[LoopChecked]:
-        """The matches of the guess that is right, if that is known."""
-        ranked = sorted(self._guesses, key=lambda guess: -len(guess.matches) * guess.score)
-        if not ranked:
+    def _believed(self, search: _Search, usual: float) -> list[LoopChecked]:
+        """The matches of the guess that is right, if that is known by this keyframe, which confirms it."""
+        ranked = sorted(self._guesses, key=lambda guess: -len(guess.matches) * guess.fit)
+        if not ranked or ranked[0].matches[-1].second != search.keyframe:
             return []
         best, rivals = ranked[0], ranked[1:]
-        rule = _rule(best, search)
         rivalled = any(2 * len(rival.matches) > len(best.matches) for rival in rivals)
-        if rivalled or best.score < least or not rule.fulfilled(best, search.poses):
+        fits = best.fit >= SURE * usual and best.score >= MOSTLY * usual
+        if rivalled or not fits or not _rule(best, search).fulfilled(best, search.poses):
             return []
         self._guesses = []
         agreeing = len(best.matches) - 1
@@ -256,7 +292,7 @@ def _in_order(match: LoopChecked) -> LoopChecked:
     )
 
 
-def _confirm(guess: Guess, search: _Search, least: float) -> None:
+def _confirm(guess: Guess, search: _Search, usual: float) -> None:
     """Try the keyframe where a guess says that it is."""
     foretold = guess.foretells(search.keyframe, search.poses)
     distances = _distances(search.poses[search.others], foretold)
@@ -264,10 +300,9 @@ def _confirm(guess: Guess, search: _Search, least: float) -> None:
         return  # on ground that the other session does not know, there is nothing to confirm it
     first = int(search.others[distances.argmin()])
     place = search.poses[first]
-    match = search.match(first, between(place, foretold))
-    if search.says(match, least) and _near(between(foretold, compose(place, match.relative))):
-        guess.matches.append(match)
-        guess.misses = 0
+    answer = search.match(first, between(place, foretold), usual)
+    if answer is not None and _near(between(foretold, compose(place, answer.match.relative))):
+        guess.add(answer)
     else:
         guess.misses += 1
 
@@ -297,10 +332,12 @@ class _Search:
         config: Config,
         matcher: Matcher[Any],
         keyframe: int,
+        keyframes: Sequence[LaserScan],
         points: Sequence[Points],
         poses: Poses,
         sessions: Sessions,
     ) -> None:
+        self._keyframes = keyframes
         self.keyframe = keyframe
         self._config = config
         self._matcher = matcher
@@ -316,13 +353,20 @@ class _Search:
         scan = self._points[self.keyframe]
         return FarSearch(self._submap(first)).look(scan, np.zeros(3), EVERYWHERE, least)
 
-    def match(self, first: int, guess: Pose) -> LoopChecked:
-        """The keyframe near where ``guess`` says it is, seen from another."""
+    def match(self, first: int, guess: Pose, usual: float) -> Answer | None:
+        """The keyframe near where ``guess`` says it is, seen from another; None where it does not belong there."""
         rng = generator(self._config.seed, Purpose.RELOCALISE, first, self.keyframe)
         tile = search_window(self._config.tracker.window)
-        reference = self._matcher.prepare(self._submap(first))
-        found = match_within(self._matcher, reference, self._points[self.keyframe], guess, NEAR, tile, rng)
-        return LoopChecked(
+        scan, reference = self._points[self.keyframe], self._matcher.prepare(self._submap(first))
+        found = match_within(self._matcher, reference, scan, guess, NEAR, tile, rng)
+        open_ended = largest_variance(found.covariance) > self._config.loops.max_std**2
+        if open_ended or not found.converged or found.score < EXPLAINED:
+            return None
+        known, conflicting = self._known(first, found.pose)
+        fit = found.score / known
+        if fit < LIKELY * usual or conflicting > CONFLICTING:
+            return None
+        match = LoopChecked(
             first=first,
             second=self.keyframe,
             accepted=True,
@@ -334,11 +378,19 @@ class _Search:
             converged=found.converged,
             expected_std=math.sqrt(ANYWHERE[0, 0]),
         )
+        return Answer(match, min(fit, 1.0))
 
-    def says(self, match: LoopChecked, least: float) -> bool:
-        """Whether a match has a score of ``least`` and leaves no direction open."""
-        sure = largest_variance(match.covariance) <= self._config.loops.max_std**2
-        return match.converged and match.score >= least and sure
+    def _known(self, first: int, pose: Pose) -> tuple[float, float]:
+        """Shares of the keyframe's returns that lie where a place is known, and where it is known to be empty."""
+        around, place = self._around(first), self.poses[first]
+        space = FreeSpace.seen_by(
+            [self._points[k] for k in around.tolist()],
+            [self._keyframes[k].laser_pose for k in around.tolist()],
+            between_many(np.tile(place, (len(around), 1)), self.poses[around]),
+        )
+        scan = self._points[self.keyframe]
+        new, conflicting = space.lacks(scan, pose), space.holds(scan, pose)
+        return max(1.0 - float(new.mean()), EXPLAINED), float(conflicting.mean())
 
     def places(self) -> NDArray[np.int64]:
         """Keyframes of other sessions, none within `APART` of another, and all others are of one."""
@@ -349,13 +401,18 @@ class _Search:
         return np.array(chosen, dtype=np.int64)
 
     def _submap(self, first: int) -> Points:
+        """Points of what is known around a keyframe, in its frame."""
+        chosen = self._around(first)
+        points = [self._points[keyframe] for keyframe in chosen.tolist()]
+        return merge(points, self.poses[chosen], self.poses[first])
+
+    def _around(self, first: int) -> NDArray[np.int64]:
+        """Keyframes that saw a place, none like another."""
         own = np.flatnonzero(self.sessions.numbers == self.sessions.numbers[first])
         distances = _distances(self.poses[own], self.poses[first])
         near = own[np.argsort(distances, kind="stable")[: np.count_nonzero(distances <= AROUND)]]
         _, kinds = np.unique(np.round(self.poses[near] / ALIKE), axis=0, return_index=True)
-        chosen = near[np.sort(kinds)[:MOST_KEYFRAMES]]
-        points = [self._points[keyframe] for keyframe in chosen.tolist()]
-        return merge(points, self.poses[chosen], self.poses[first])
+        return near[np.sort(kinds)[:MOST_KEYFRAMES]]
 
 
 def _distances(poses: Poses, pose: Pose) -> NDArray[np.float64]:
