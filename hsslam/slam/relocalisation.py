@@ -9,34 +9,17 @@ from operator import itemgetter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hsslam.config import Config
-from hsslam.matching.interface import Matcher, SearchWindow
+from hsslam.matching.interface import Matcher
 from hsslam.scan import LaserScan
-from hsslam.se2 import Points, Pose, Poses, between, between_many, compose, inverse
+from hsslam.se2 import Points, Pose, Poses, between, compose, inverse
 from hsslam.slam.events import LoopChecked
-from hsslam.slam.far import NEAR, FarSearch
-from hsslam.slam.free_space import FreeSpace
-from hsslam.slam.fusion import largest_variance, of_inverse
-from hsslam.slam.randomness import Purpose, generator
+from hsslam.slam.fusion import of_inverse
+from hsslam.slam.places import APART, Answer, PlaceSearch, distances
 from hsslam.slam.sessions import Sessions
 from hsslam.slam.stopwatch import Stopwatch
-from hsslam.slam.submap import merge
-from hsslam.slam.tracker import ANYWHERE
-from hsslam.slam.windows import differences, match_within, search_window
-
-APART = 2.5
-"""Distance of the places that are looked at (m)."""
-
-AROUND = 3.0
-ALIKE = np.array([1.0, 1.0, math.radians(45.0)])
-MOST_KEYFRAMES = 20
-"""What is known of a place: keyframes within `AROUND` (m) of its middle, one of those that are `ALIKE` (m, m, rad), the
-nearest, so many at most."""
-
-EVERYWHERE = SearchWindow(APART, APART, math.pi)
-"""Around each of them."""
+from hsslam.slam.windows import differences
 
 MOST_PLACES = 100
 """Places that one keyframe is tried in, at most; the next goes on with others."""
@@ -52,16 +35,7 @@ of `SELDOM` at most. All are tried where a guess says that they are."""
 COARSELY = 0.55
 """Share of the usual score that the coarse search must find."""
 
-EXPLAINED = 0.5
-"""Share of a keyframe's returns that a match must explain."""
-
-LIKELY = 0.8
-"""Share of the usual score that it must explain of the returns that lie where the place is known."""
-
-CONFLICTING = 0.08
-"""Share of its returns that may lie where the place is empty: those of people; a false match has mostly more."""
-
-SURE, MOSTLY = 0.9, 0.7
+SURE, MOSTLY = 0.9, 0.75
 """What the matches of a guess must come to on average to be believed: share of the usual score as for `LIKELY`, and of
 all returns."""
 
@@ -73,7 +47,8 @@ DRIFT_THETA = math.radians(25.0)
 """What odometry may be off after a pause that it knows of: share of the way, and heading (rad)."""
 
 MISSES = 2
-"""Keyframes in a row that may fail to confirm a guess."""
+MEMORY = 10
+"""Keyframes in a row that may fail to confirm a guess, and that may see nothing that could."""
 
 SAME_XY = 0.3
 SAME_THETA = math.radians(5.0)
@@ -124,14 +99,6 @@ WIDE = (5.0, math.radians(90.0))
 SOMEWHERE = Confirmation(10, 1.2, math.radians(30.0), 1.5)
 """Ten metres of one corridor may look just like those of another, or like their own the other way round; they do no
 more where the robot turns off."""
-
-
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """A match, and the share of the returns that it explains of those that lie where the place is known."""
-
-    match: LoopChecked
-    fit: float
 
 
 class Guess:
@@ -218,10 +185,10 @@ class Relocalisation:
             Once the robot's place is known: loops between keyframes of both sessions that say so, all accepted.
         """
         with self._stopwatch.measure("relocalisation"):
-            search = _Search(self._config, self._matcher, keyframe, keyframes, points, poses, sessions)
+            search = PlaceSearch(self._config, self._matcher, keyframe, keyframes, points, poses, sessions)
             return self._look(search, usual)
 
-    def _look(self, search: _Search, usual: float) -> list[LoopChecked]:
+    def _look(self, search: PlaceSearch, usual: float) -> list[LoopChecked]:
         foreign = search.foreign
         self._guesses = [
             guess
@@ -230,14 +197,18 @@ class Relocalisation:
         ]
         for guess in self._guesses:
             _confirm(guess, search, usual)
-        self._guesses = [guess for guess in self._guesses if guess.misses <= MISSES]
+        self._guesses = [
+            guess
+            for guess in self._guesses
+            if guess.misses <= MISSES and search.keyframe - guess.matches[-1].second <= MEMORY
+        ]
         own = search.keyframe - search.start
         if own < EAGER or own % min(max(own // PATIENCE, EVERY), SELDOM) == 0:
             for answer in self._everywhere(search, usual):
                 self._take(answer, search.poses)
         return self._believed(search, usual)
 
-    def _everywhere(self, search: _Search, usual: float) -> list[Answer]:
+    def _everywhere(self, search: PlaceSearch, usual: float) -> list[Answer]:
         """Matches of the keyframe in the places that look most like what it sees."""
         places = search.places()
         if len(places) > MOST_PLACES:
@@ -264,7 +235,7 @@ class Relocalisation:
         self._guesses.sort(key=lambda guess: (-len(guess.matches), -guess.fit))
         del self._guesses[MOST_GUESSES:]
 
-    def _believed(self, search: _Search, usual: float) -> list[LoopChecked]:
+    def _believed(self, search: PlaceSearch, usual: float) -> list[LoopChecked]:
         """The matches of the guess that is right, if that is known by this keyframe, which confirms it."""
         ranked = sorted(self._guesses, key=lambda guess: -len(guess.matches) * guess.fit)
         if not ranked or ranked[0].matches[-1].second != search.keyframe:
@@ -292,13 +263,13 @@ def _in_order(match: LoopChecked) -> LoopChecked:
     )
 
 
-def _confirm(guess: Guess, search: _Search, usual: float) -> None:
+def _confirm(guess: Guess, search: PlaceSearch, usual: float) -> None:
     """Try the keyframe where a guess says that it is."""
     foretold = guess.foretells(search.keyframe, search.poses)
-    distances = _distances(search.poses[search.others], foretold)
-    if distances.min() > APART:
+    away = distances(search.poses[search.others], foretold)
+    if away.min() > APART:
         return  # on ground that the other session does not know, there is nothing to confirm it
-    first = int(search.others[distances.argmin()])
+    first = int(search.others[away.argmin()])
     place = search.poses[first]
     answer = search.match(first, between(place, foretold), usual)
     if answer is not None and _near(between(foretold, compose(place, answer.match.relative))):
@@ -307,7 +278,7 @@ def _confirm(guess: Guess, search: _Search, usual: float) -> None:
         guess.misses += 1
 
 
-def _rule(guess: Guess, search: _Search) -> Confirmation:
+def _rule(guess: Guess, search: PlaceSearch) -> Confirmation:
     """What has to confirm a guess: the less, the better it agrees with what is known of the pause before."""
     start, poses, sessions = search.start, search.poses, search.sessions
     pause = sessions.pauses.get(start)
@@ -322,103 +293,6 @@ def _rule(guess: Guess, search: _Search) -> Confirmation:
     if foreseen or (reachable and reach <= NEARBY):
         return FORESEEN
     return REACHABLE if reachable and reach <= FARTHER else SOMEWHERE
-
-
-class _Search:
-    """A keyframe, looked for in places of other sessions than its own."""
-
-    def __init__(
-        self,
-        config: Config,
-        matcher: Matcher[Any],
-        keyframe: int,
-        keyframes: Sequence[LaserScan],
-        points: Sequence[Points],
-        poses: Poses,
-        sessions: Sessions,
-    ) -> None:
-        self._keyframes = keyframes
-        self.keyframe = keyframe
-        self._config = config
-        self._matcher = matcher
-        self._points = points
-        self.sessions = sessions
-        self.poses = poses
-        self.foreign = sessions.foreign(keyframe)
-        self.others = np.flatnonzero(self.foreign)
-        self.start = sessions.start(keyframe)
-
-    def coarsely(self, first: int, least: float) -> tuple[Pose, float]:
-        """Where around another keyframe it fits best, seen from there, and how well, if as well as ``least``."""
-        scan = self._points[self.keyframe]
-        return FarSearch(self._submap(first)).look(scan, np.zeros(3), EVERYWHERE, least)
-
-    def match(self, first: int, guess: Pose, usual: float) -> Answer | None:
-        """The keyframe near where ``guess`` says it is, seen from another; None where it does not belong there."""
-        rng = generator(self._config.seed, Purpose.RELOCALISE, first, self.keyframe)
-        tile = search_window(self._config.tracker.window)
-        scan, reference = self._points[self.keyframe], self._matcher.prepare(self._submap(first))
-        found = match_within(self._matcher, reference, scan, guess, NEAR, tile, rng)
-        open_ended = largest_variance(found.covariance) > self._config.loops.max_std**2
-        if open_ended or not found.converged or found.score < EXPLAINED:
-            return None
-        known, conflicting = self._known(first, found.pose)
-        fit = found.score / known
-        if fit < LIKELY * usual or conflicting > CONFLICTING:
-            return None
-        match = LoopChecked(
-            first=first,
-            second=self.keyframe,
-            accepted=True,
-            reason="",
-            relative=found.pose,
-            covariance=found.covariance,
-            score=found.score,
-            evaluations=found.evaluations,
-            converged=found.converged,
-            expected_std=math.sqrt(ANYWHERE[0, 0]),
-        )
-        return Answer(match, min(fit, 1.0))
-
-    def _known(self, first: int, pose: Pose) -> tuple[float, float]:
-        """Shares of the keyframe's returns that lie where a place is known, and where it is known to be empty."""
-        around, place = self._around(first), self.poses[first]
-        space = FreeSpace.seen_by(
-            [self._points[k] for k in around.tolist()],
-            [self._keyframes[k].laser_pose for k in around.tolist()],
-            between_many(np.tile(place, (len(around), 1)), self.poses[around]),
-        )
-        scan = self._points[self.keyframe]
-        new, conflicting = space.lacks(scan, pose), space.holds(scan, pose)
-        return max(1.0 - float(new.mean()), EXPLAINED), float(conflicting.mean())
-
-    def places(self) -> NDArray[np.int64]:
-        """Keyframes of other sessions, none within `APART` of another, and all others are of one."""
-        left, chosen = self.others, []
-        while len(left):
-            chosen.append(left[0])
-            left = left[_distances(self.poses[left], self.poses[left[0]]) > APART]
-        return np.array(chosen, dtype=np.int64)
-
-    def _submap(self, first: int) -> Points:
-        """Points of what is known around a keyframe, in its frame."""
-        chosen = self._around(first)
-        points = [self._points[keyframe] for keyframe in chosen.tolist()]
-        return merge(points, self.poses[chosen], self.poses[first])
-
-    def _around(self, first: int) -> NDArray[np.int64]:
-        """Keyframes that saw a place, none like another."""
-        own = np.flatnonzero(self.sessions.numbers == self.sessions.numbers[first])
-        distances = _distances(self.poses[own], self.poses[first])
-        near = own[np.argsort(distances, kind="stable")[: np.count_nonzero(distances <= AROUND)]]
-        _, kinds = np.unique(np.round(self.poses[near] / ALIKE), axis=0, return_index=True)
-        return near[np.sort(kinds)[:MOST_KEYFRAMES]]
-
-
-def _distances(poses: Poses, pose: Pose) -> NDArray[np.float64]:
-    """Distances (N,) of poses (N, 3) from another (m)."""
-    distances: NDArray[np.float64] = np.hypot(poses[:, 0] - pose[0], poses[:, 1] - pose[1])
-    return distances
 
 
 def _near(off: Pose) -> bool:
