@@ -1,4 +1,4 @@
-"""Where in what was seen before a keyframe may be from: every pose around a place, then a match, then what denies it."""
+"""Where in what was seen before a keyframe may be from: poses around a place, a match there, and what denies it."""
 
 from __future__ import annotations
 

@@ -48,7 +48,8 @@ DRIFT_THETA = math.radians(25.0)
 
 MISSES = 2
 MEMORY = 10
-"""Keyframes in a row that may fail to confirm a guess, and that may see nothing that could."""
+"""Keyframes in a row that may fail to confirm a guess, and that may see nothing that could. One that was refuted is
+remembered for as many: where two were as good for a while, others may be."""
 
 SAME_XY = 0.3
 SAME_THETA = math.radians(5.0)
@@ -96,7 +97,7 @@ NEARBY, FARTHER = 5.0, 15.0
 WIDE = (5.0, math.radians(90.0))
 """A wide way and a wide turn (m, rad)."""
 
-SOMEWHERE = Confirmation(10, 1.2, math.radians(30.0), 1.5)
+SOMEWHERE = Confirmation(10, 2.0, math.radians(30.0), 1.5)
 """Ten metres of one corridor may look just like those of another, or like their own the other way round; they do no
 more where the robot turns off."""
 
@@ -155,6 +156,7 @@ class Relocalisation:
         self._matcher = matcher
         self._stopwatch = stopwatch
         self._guesses: list[Guess] = []
+        self._refuted: list[Guess] = []
         self._next = 0
 
     def look(
@@ -197,11 +199,11 @@ class Relocalisation:
         ]
         for guess in self._guesses:
             _confirm(guess, search, usual)
-        self._guesses = [
-            guess
-            for guess in self._guesses
-            if guess.misses <= MISSES and search.keyframe - guess.matches[-1].second <= MEMORY
-        ]
+        recent = [g for g in self._guesses if search.keyframe - g.matches[-1].second <= MEMORY]
+        self._guesses = [guess for guess in recent if guess.misses <= MISSES]
+        self._refuted = [
+            g for g in self._refuted if 0 <= search.keyframe - g.matches[-1].second <= MEMORY
+        ] + [guess for guess in recent if guess.misses > MISSES]
         own = search.keyframe - search.start
         if own < EAGER or own % min(max(own // PATIENCE, EVERY), SELDOM) == 0:
             for answer in self._everywhere(search, usual):
@@ -240,12 +242,12 @@ class Relocalisation:
         ranked = sorted(self._guesses, key=lambda guess: -len(guess.matches) * guess.fit)
         if not ranked or ranked[0].matches[-1].second != search.keyframe:
             return []
-        best, rivals = ranked[0], ranked[1:]
+        best, rivals = ranked[0], ranked[1:] + self._refuted
         rivalled = any(2 * len(rival.matches) > len(best.matches) for rival in rivals)
         fits = best.fit >= SURE * usual and best.score >= MOSTLY * usual
         if rivalled or not fits or not _rule(best, search).fulfilled(best, search.poses):
             return []
-        self._guesses = []
+        self._guesses, self._refuted = [], []
         agreeing = len(best.matches) - 1
         return [_in_order(replace(match, agreeing=agreeing)) for match in best.matches]
 
