@@ -89,6 +89,15 @@ class World:
             yield replace(scan, ranges=ranges, odometry=odometry[scan.index].copy())
 
 
+def carried(scans: list[LaserScan]) -> list[LaserScan]:
+    """A recording without the tenth in its middle, during which the robot was carried: odometry does not know of it."""
+    first, stop = int(0.45 * len(scans)), int(0.55 * len(scans))
+    before, after = scans[first - 1].odometry, scans[stop].odometry
+    return scans[:first] + [
+        replace(scan, odometry=compose(before, between(after, scan.odometry))) for scan in scans[stop:]
+    ]
+
+
 def world(number: int) -> World:
     """Draw the world of a number."""
     rng = np.random.default_rng(number)
