@@ -183,6 +183,23 @@ def test_straight_on_along_one_wall_nothing_is_sure() -> None:
     assert not looked_for(TURNING[:straight], Pause(np.zeros(3), math.inf))
 
 
+def test_of_two_places_that_are_alike_neither_is_believed() -> None:
+    """The same building twice in one map: whatever is seen next, it is in both."""
+    known = list(range(0, 700, 6))
+    twin = OFFICE.poses[known] + (60.0, 0.0, 0.0)
+    after = [compose(AWAY, there) for there in OFFICE.poses[TURNING]]
+    poses = np.array([*OFFICE.poses[known], *twin, *after])
+    scans = [_SCANS[i] for i in (*known, *known, *TURNING)]
+    points = [scan.robot_points for scan in scans]
+    relocalisation, sessions = Relocalisation(Config(), create("hide"), Stopwatch()), Sessions()
+    for _ in range(2 * len(known)):
+        sessions.add()
+    for k in range(2 * len(known), 2 * len(known) + 60):
+        sessions.add(Pause(np.zeros(3), math.inf) if k == 2 * len(known) else None)
+        stop = k + 1
+        assert not relocalisation.look(k, scans[:stop], points[:stop], poses[:stop], sessions, 0.95)
+
+
 def test_what_was_driven_first_is_found_in_what_was_driven_later() -> None:
     loops = looked_for(TURNING, Pause(np.zeros(3), math.inf), again=True)
     assert loops
