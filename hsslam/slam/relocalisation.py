@@ -37,7 +37,7 @@ COARSELY = 0.55
 
 SURE, MOSTLY = 0.9, 0.75
 """What the matches of a guess must come to on average to be believed: share of the usual score as for `LIKELY`, and of
-all returns."""
+all returns; see `PLENTY`."""
 
 SPEED, TURN_RATE = 1.5, 1.0
 """Of a robot, or of who carries it (m/s, rad/s)."""
@@ -100,6 +100,9 @@ WIDE = (5.0, math.radians(90.0))
 SOMEWHERE = Confirmation(10, 2.0, math.radians(30.0), 1.5)
 """Ten metres of one corridor may look just like those of another, or like their own the other way round; they do no
 more where the robot turns off."""
+
+PLENTY = Confirmation(20, 5.0, math.radians(45.0), 2.0)
+"""So many keyframes need not see mostly what is known: the session grazes the other."""
 
 
 class Guess:
@@ -244,7 +247,8 @@ class Relocalisation:
             return []
         best, rivals = ranked[0], ranked[1:] + self._refuted
         rivalled = any(2 * len(rival.matches) > len(best.matches) for rival in rivals)
-        fits = best.fit >= SURE * usual and best.score >= MOSTLY * usual
+        enough_seen = best.score >= MOSTLY * usual or PLENTY.fulfilled(best, search.poses)
+        fits = best.fit >= SURE * usual and enough_seen
         if rivalled or not fits or not _rule(best, search).fulfilled(best, search.poses):
             return []
         self._guesses, self._refuted = [], []
