@@ -135,3 +135,13 @@ def test_slow_recordings_do_not_pause_and_the_first_scans_do_not_tell() -> None:
     for stamp in in_turn(0.1, 5).tolist():
         young.observe(stamp)
     assert not young.paused(stamp + 11.0)
+
+
+@pytest.mark.parametrize(("stamp", "paused"), [(3.5, False), (4.5, True), (-3.5, False), (-50.0, True)])
+def test_where_stamps_come_late_a_pause_is_longer(stamp: float, paused: bool) -> None:
+    """Intel's recorder wrote in bursts, up to 3.5 s late; one such scan, which did not fit, was taken for a pause."""
+    clock = ScanClock()
+    stamps = in_turn(0.19, 40).tolist()
+    for known in (*stamps, stamps[-1] + 1.5, stamps[-1] + 1.51):
+        clock.observe(known)
+    assert clock.paused(stamps[-1] + 1.51 + stamp) is paused

@@ -23,6 +23,9 @@ PAUSE_INTERVALS = 10
 """A recording paused where stamps go on by more than so many usual intervals and seconds, or so many seconds back; what
 is usual is known after so many."""
 
+PAUSE_AMONG_LATE = 4.0
+"""Where stamps come late, it takes so many times as long: Intel's are up to 3.5 s late."""
+
 
 class ScanClock:
     """Tells the time between scans.
@@ -54,6 +57,8 @@ class ScanClock:
     def paused(self, stamp: float) -> bool:
         """Whether the recording paused before a scan, or began anew with it."""
         interval, least = stamp - self._last, max(PAUSE * self._usual, PAUSE_SECONDS)
+        if self._doubted:
+            least *= PAUSE_AMONG_LATE
         return self._intervals >= PAUSE_INTERVALS and (interval > least or interval < -least)
 
     def pause(self, stamp: float) -> float:
