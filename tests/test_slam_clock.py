@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hsslam.config import GraphSection, load_config
+from hsslam.datasets.catalogue import open_dataset
 from hsslam.datasets.simulator import EXACT, DriveModel, SimulatedDataset
 from hsslam.scan import LaserScan, ScanGeometry
 from hsslam.se2 import between_many
@@ -145,3 +147,10 @@ def test_where_stamps_come_late_a_pause_is_longer(stamp: float, paused: bool) ->
     for known in (*stamps, stamps[-1] + 1.5, stamps[-1] + 1.51):
         clock.observe(known)
     assert clock.paused(stamps[-1] + 1.51 + stamp) is paused
+
+
+def test_intel_as_recorded_never_paused(shared_data: Path) -> None:
+    clock = ScanClock()
+    for scan in open_dataset("intel", data_dir=shared_data).scans():
+        assert not clock.paused(scan.stamp), scan.index
+        clock.observe(scan.stamp)
