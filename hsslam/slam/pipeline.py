@@ -80,7 +80,6 @@ class Slam:
         self._matched = 0
         self._evaluations = 0
         self._guessed = 0
-        self._paused_before: list[int] = []
         self._first_guessed: int | None = None
         self._ended = False
 
@@ -131,8 +130,6 @@ class Slam:
             return
         self._tracker.add_keyframe(scan.robot_points, scan.laser_pose, tracked)
         self._graph.add_keyframe(tracked.relative, tracked.covariance)
-        if self._tracker.pause is not None:
-            self._paused_before.append(scan.index)
         self._scans.becomes_keyframe(newest + 1)
         yield self._keep(scan, lasting)
         self._watch(recorded)
@@ -262,7 +259,7 @@ class Slam:
             statistics={
                 "evaluations": self._evaluations,
                 "guessed": self._guessed,
-                "paused_before": list(self._paused_before),
+                "paused_before": [self._keyframes[k].index for k in self._sessions.pauses],
                 "sessions": len(self._sessions.split()),
                 "first_guessed": self._first_guessed,
                 "own_parts_deg": self._own_parts.degrees,

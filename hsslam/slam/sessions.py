@@ -61,7 +61,7 @@ class Sessions:
     @property
     def single(self) -> bool:
         """Whether all keyframes belong to one."""
-        return not self.foreign(0).any()
+        return not self.pauses or not self.foreign(0).any()
 
     def foreign(self, keyframe: int) -> NDArray[np.bool_]:
         """Which keyframes are of other sessions than one of them, (K,)."""
