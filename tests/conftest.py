@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 from hsslam.scan import LaserScan, ScanGeometry
+from hsslam.se2 import Points, Poses
+from hsslam.slam.keyframes import Keyframes
+from hsslam.slam.scan_table import ScanTable
+from hsslam.slam.sessions import Sessions
 
 ROOM = np.array(
     [
@@ -80,3 +85,19 @@ def room_pair() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.fl
     first = room_scan_at(np.zeros(3), noise=0.005, seed=1).points
     second = room_scan_at(truth, noise=0.005, seed=2).points
     return first, second, truth
+
+
+def keyframes_of(points: Sequence[Points], poses: Poses) -> Keyframes:
+    """Keyframes of one session, of which no more is known than their points and where they are."""
+    sessions = Sessions()
+    for _ in points:
+        sessions.add()
+    return Keyframes((), points, poses, sessions)
+
+
+def scans_tracked(points: Sequence[Points], anchors: NDArray[np.int64], relatives: Poses) -> ScanTable:
+    """Scans that hang on keyframes, of which no more is known."""
+    scans = ScanTable()
+    for seen, anchor, relative in zip(points, anchors, relatives, strict=True):
+        scans.append(0.0, np.zeros(3), np.zeros(3), int(anchor), relative, np.zeros(3), np.eye(3), seen)
+    return scans

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import room_scan_at
+from conftest import keyframes_of, room_scan_at
 
 from hsslam.config import load_config
 from hsslam.datasets.simulator import SimulatedDataset
@@ -16,7 +16,6 @@ from hsslam.se2 import Points, Poses, between, compose, pose, wrap
 from hsslam.search.exhaustive import ExhaustiveReference, lattice_search
 from hsslam.slam.far import CELL, FarSearch
 from hsslam.slam.loops import Candidate, LoopCloser
-from hsslam.slam.sessions import Sessions
 from hsslam.slam.stopwatch import Stopwatch
 
 WIDE = SearchWindow(6.0, 6.0, math.radians(30.0))
@@ -62,13 +61,6 @@ def test_a_window_that_reaches_no_further_holds_no_other_answer() -> None:
     assert FarSearch(PLACE).elsewhere(PLACE, np.zeros(3), near, near) == []
 
 
-def one_session(keyframes: int) -> Sessions:
-    sessions = Sessions()
-    for _ in range(keyframes):
-        sessions.add()
-    return sessions
-
-
 DRIFT = pose(4.2, -3.1, 0.15)
 
 
@@ -88,10 +80,10 @@ def test_a_loop_is_found_after_a_drift_of_metres(name: str, round_trip: tuple[Po
     estimate[-1] = compose(DRIFT, truth[-1])
     closer = LoopCloser(load_config(overrides=[f"matcher={name}"]), create(name), Stopwatch())
     candidate = Candidate(first=5, variance_xy=2.0**2, variance_theta=math.radians(5.0) ** 2)
-    loop = closer.match(candidate, points, estimate, one_session(len(points)))
+    loop = closer.match(candidate, keyframes_of(points, estimate))
     assert loop.reason == ""
     assert loop.relative == pytest.approx(between(truth[5], truth[-1]), abs=0.03)
-    assert closer.ambiguity(loop, points, estimate, one_session(len(points))) > 0.9
+    assert closer.ambiguity(loop, keyframes_of(points, estimate)) > 0.9
 
 
 @pytest.mark.parametrize(
@@ -108,6 +100,6 @@ def test_a_place_beyond_the_far_window_is_found_where_the_graph_is_unsure_of_mor
     window = [f"loops.far_window.half_x={half}", f"loops.far_window.half_y={half}"]
     closer = LoopCloser(load_config(overrides=window), create("hide"), Stopwatch())
     candidate = Candidate(first=5, variance_xy=std**2, variance_theta=math.radians(5.0) ** 2)
-    loop = closer.match(candidate, points, estimate, one_session(len(points)))
+    loop = closer.match(candidate, keyframes_of(points, estimate))
     off = between(between(truth[5], truth[-1]), loop.relative)
     assert (math.hypot(off[0], off[1]) < 0.03) is found

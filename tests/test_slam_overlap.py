@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import room_scan_at
+from conftest import keyframes_of, room_scan_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -61,7 +61,7 @@ def test_matched_pairs_correct_poses_that_are_off() -> None:
     points = [room_scan_at(p, noise=0.005, seed=i).points for i, p in enumerate(truth)]
     disturbed = truth.copy()
     disturbed[2] = compose(truth[2], pose(0.06, -0.05, 0.04))
-    edges = match_pairs(Config(), create("hide"), points, disturbed, [(0, 2)], 0)
+    edges = match_pairs(Config(), create("hide"), keyframes_of(points, disturbed), [(0, 2)], 0)
     (edge,) = edges
     assert (edge.first, edge.second, edge.kind) == (0, 2, "overlap")
     assert edge.relative == pytest.approx(between(truth[0], truth[2]), abs=0.01)
@@ -70,4 +70,4 @@ def test_matched_pairs_correct_poses_that_are_off() -> None:
 def test_what_does_not_match_is_no_constraint() -> None:
     points = [room_scan_at(np.zeros(3)).points, np.column_stack((np.linspace(20, 30, 50), np.zeros(50)))]
     poses = np.zeros((2, 3))
-    assert match_pairs(Config(), create("hide"), points, poses, [(0, 1)], 0) == []
+    assert match_pairs(Config(), create("hide"), keyframes_of(points, poses), [(0, 1)], 0) == []

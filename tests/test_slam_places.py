@@ -13,6 +13,7 @@ from hsslam.config import Config
 from hsslam.matching import create
 from hsslam.scan import LaserScan
 from hsslam.se2 import Pose, between, compose, pose
+from hsslam.slam.keyframes import Keyframes
 from hsslam.slam.places import PlaceSearch
 from hsslam.slam.sessions import Pause, Sessions
 
@@ -29,7 +30,8 @@ def search_with(seen: LaserScan, known: list[Pose] = KNOWN) -> PlaceSearch:
         sessions.add(Pause(np.zeros(3), math.inf) if k == len(known) else None)
     poses = np.array([*known, compose(AWAY, HERE)])
     points = [scan.robot_points for scan in scans]
-    return PlaceSearch(Config(), create("hide"), len(known), scans, points, poses, sessions)
+    keyframes = Keyframes(scans, points, poses, sessions)
+    return PlaceSearch(Config(), create("hide"), len(known), keyframes)
 
 
 def test_a_keyframe_is_found_in_the_room_that_it_is_of() -> None:

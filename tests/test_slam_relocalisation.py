@@ -18,6 +18,7 @@ from hsslam.scan import LaserScan
 from hsslam.se2 import Points, Poses, between, between_many, compose, compose_many, pose
 from hsslam.slam.events import LoopChecked, SlamResult
 from hsslam.slam.journal import Header, Journal, read_journal
+from hsslam.slam.keyframes import Keyframes
 from hsslam.slam.pipeline import Slam
 from hsslam.slam.relocalisation import Relocalisation
 from hsslam.slam.sessions import Pause, Sessions
@@ -148,7 +149,8 @@ def looked_for(numbers: list[int], pause: Pause, *, again: bool = False) -> list
         until = Sessions()
         for i in range(stop):
             until.add(pause if i == len(known) else None)
-        loops = relocalisation.look(k, scans[:stop], points[:stop], poses[:stop], until, 0.95)
+        known_by_now = Keyframes(scans[:stop], points[:stop], poses[:stop], until)
+        loops = relocalisation.look(k, known_by_now, 0.95)
         if loops:
             for loop in loops:
                 off = between(between(truth[loop.first], truth[loop.second]), loop.relative)
@@ -197,7 +199,8 @@ def test_of_two_places_that_are_alike_neither_is_believed() -> None:
     for k in range(2 * len(known), 2 * len(known) + 60):
         sessions.add(Pause(np.zeros(3), math.inf) if k == 2 * len(known) else None)
         stop = k + 1
-        assert not relocalisation.look(k, scans[:stop], points[:stop], poses[:stop], sessions, 0.95)
+        keyframes = Keyframes(scans[:stop], points[:stop], poses[:stop], sessions)
+        assert not relocalisation.look(k, keyframes, 0.95)
 
 
 def test_what_was_driven_first_is_found_in_what_was_driven_later() -> None:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import room_scan_at
+from conftest import keyframes_of, room_scan_at, scans_tracked
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
@@ -134,12 +134,8 @@ def test_scans_that_were_disturbed_are_matched_back(rng: np.random.Generator) ->
     found, covariances, matched = match_scans(
         Config(),
         create("hide"),
-        points,
-        keyframes,
-        np.zeros(len(keyframes), dtype=np.int64),
-        scans,
-        anchors // 2,
-        disturbed,
+        keyframes_of(points, keyframes),
+        scans_tracked(scans, anchors // 2, disturbed),
         np.ones(40, dtype=np.bool_),
     )
     assert matched.all()
@@ -162,12 +158,8 @@ def test_a_scan_that_sees_nothing_known_stays_where_it_was() -> None:
     found, _, matched = match_scans(
         Config(),
         create("hide"),
-        known[:1],
-        office.poses[:1],
-        np.zeros(1, dtype=np.int64),
-        [known[0], blank],
-        np.zeros(2, dtype=np.int64),
-        np.array([np.zeros(3), relative]),
+        keyframes_of(known[:1], office.poses[:1]),
+        scans_tracked([known[0], blank], np.zeros(2, dtype=np.int64), np.array([np.zeros(3), relative])),
         np.ones(2, dtype=np.bool_),
     )
     assert matched.tolist() == [True, False]
@@ -190,12 +182,10 @@ def test_a_person_who_walks_along_does_not_draw_a_scan_away() -> None:
     found, _, matched = match_scans(
         load_config(overrides=["graph.overlap_half_xy=0.3"]),
         create("hide"),
-        [seen_from(0.0)],
-        np.zeros((1, 3)),
-        np.zeros(1, dtype=np.int64),
-        [seen_from(0.0).astype(np.float32), seen_from(0.22).astype(np.float32)],
-        np.zeros(2, dtype=np.int64),
-        np.array([np.zeros(3), relative]),
+        keyframes_of([seen_from(0.0)], np.zeros((1, 3))),
+        scans_tracked(
+            [seen_from(0.0), seen_from(0.22)], np.zeros(2, dtype=np.int64), np.array([np.zeros(3), relative])
+        ),
         np.ones(2, dtype=np.bool_),
     )
     assert matched.all()
@@ -209,12 +199,8 @@ def test_what_is_found_at_the_edge_of_the_window_is_not_believed(off: float, bel
     found, _, matched = match_scans(
         Config(),
         create("hide"),
-        [first],
-        np.zeros((1, 3)),
-        np.zeros(1, dtype=np.int64),
-        [first.astype(np.float32), second.astype(np.float32)],
-        np.zeros(2, dtype=np.int64),
-        np.zeros((2, 3)),
+        keyframes_of([first], np.zeros((1, 3))),
+        scans_tracked([first, second], np.zeros(2, dtype=np.int64), np.zeros((2, 3))),
         np.ones(2, dtype=np.bool_),
     )
     assert matched.tolist() == [True, believed]
@@ -234,12 +220,8 @@ def test_scans_are_matched_against_the_keyframes_before_and_after_them() -> None
         return match_with_keyframes(
             load_config(overrides=[f"graph.rescan_neighbours={neighbours}"]),
             create("hide"),
-            [scans[k] for k in starts],
-            office.poses[starts],
-            np.zeros(4, dtype=np.int64),
-            [points.astype(np.float32) for points in scans],
-            anchors,
-            relatives,
+            keyframes_of([scans[k] for k in starts], office.poses[starts]),
+            scans_tracked(scans, anchors, relatives),
         )
 
     pairs = matched(1)
@@ -261,12 +243,8 @@ def test_a_keyframe_that_shows_nothing_of_a_scan_is_no_partner() -> None:
     pairs = match_with_keyframes(
         Config(),
         create("hide"),
-        known[:1],
-        np.zeros((1, 3)),
-        np.zeros(1, dtype=np.int64),
-        [known[0].astype(np.float32), blank.astype(np.float32)],
-        np.zeros(2, dtype=np.int64),
-        np.zeros((2, 3)),
+        keyframes_of(known[:1], np.zeros((1, 3))),
+        scans_tracked([known[0], blank], np.zeros(2, dtype=np.int64), np.zeros((2, 3))),
     )
     assert len(pairs) == 0
 

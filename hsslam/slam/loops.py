@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -19,11 +18,11 @@ from hsslam.slam.events import LoopChecked
 from hsslam.slam.far import NEAR, FarSearch
 from hsslam.slam.fusion import largest_variance, rotated, squared_mahalanobis
 from hsslam.slam.graph import PoseGraph
+from hsslam.slam.keyframes import Keyframes
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.recovery import best_elsewhere
 from hsslam.slam.sessions import Sessions
 from hsslam.slam.stopwatch import Stopwatch
-from hsslam.slam.submap import merge
 from hsslam.slam.windows import foreseen_window, match_within, search_window
 
 REFERENCES_KEPT = 10
@@ -132,24 +131,19 @@ class LoopCloser:
         return np.array(chosen, dtype=np.int64)
 
     def match(
-        self,
-        candidate: Candidate,
-        points: Sequence[Points],
-        poses: Poses,
-        sessions: Sessions,
-        known: LoopChecked | None = None,
+        self, candidate: Candidate, keyframes: Keyframes, known: LoopChecked | None = None
     ) -> LoopChecked:
         """Match the newest keyframe against the submap around a candidate; the verdict is still open.
 
         ``known``, what an earlier, interrupted run found, is taken as it is. The submap is made all the same:
         later candidates use it as it was now, in a resumed run as in a whole one.
         """
-        first, second = candidate.first, len(poses) - 1
+        first, second, poses = candidate.first, len(keyframes) - 1, keyframes.poses
         with self._stopwatch.measure("loops"):
-            place = self._place(first, points, poses, sessions)
+            place = self._place(first, keyframes)
             guess = between(poses[first], poses[second])
             if known is None:
-                known = self._match(candidate, second, points[second], place, guess)
+                known = self._match(candidate, second, keyframes.points[second], place, guess)
         deviation = known.relative - guess
         deviation[2] = wrap(deviation[2])
         foreseen = np.diag([candidate.variance_xy, candidate.variance_xy, candidate.variance_theta])
@@ -172,14 +166,12 @@ class LoopCloser:
         """Let go of the prepared submaps; those that are wanted again are prepared again."""
         self._places.clear()
 
-    def ambiguity(
-        self, loop: LoopChecked, points: Sequence[Points], poses: Poses, sessions: Sessions
-    ) -> float:
+    def ambiguity(self, loop: LoopChecked, keyframes: Keyframes) -> float:
         """Score of the best answer elsewhere in the window of the search, over that of the loop's own answer."""
         with self._stopwatch.measure("ambiguity"):
-            place = self._place(loop.first, points, poses, sessions)
+            place = self._place(loop.first, keyframes)
             answer = compose(place.of(loop.first), loop.relative)
-            scan = points[loop.second]
+            scan = keyframes.points[loop.second]
             rng = generator(self._config.seed, Purpose.AMBIGUITY, loop.first, loop.second)
             window = foreseen_window(loop.expected_std**2, 0.0, self._widest, self._farthest)
             if window == self._widest:
@@ -228,7 +220,7 @@ class LoopCloser:
             converged=result.converged,
         )
 
-    def _place(self, first: int, points: Sequence[Points], poses: Poses, sessions: Sessions) -> _Place:
+    def _place(self, first: int, keyframes: Keyframes) -> _Place:
         size = self._config.loops.submap_size
         step = max(size // 2, 1)
         number = first // step
@@ -237,12 +229,12 @@ class LoopCloser:
         if place is None or not place.first <= first < place.first + len(place.poses):
             middle = number * step + step // 2
             low = max(middle - size // 2, 0)
-            high = min(middle + size // 2 + 1, len(poses) - 1)
+            high = min(middle + size // 2 + 1, len(keyframes) - 1)
             low, high = min(low, first), max(high, first + 1)
-            low, high = sessions.around(first, low, high)
-            origin = poses[min(max(middle, low), high - 1)].copy()
-            reference = self._matcher.prepare(merge(points[low:high], poses[low:high], origin))
-            place = _Place(reference, origin, low, poses[low:high].copy())
+            low, high = keyframes.sessions.around(first, low, high)
+            origin = keyframes.poses[min(max(middle, low), high - 1)].copy()
+            reference = self._matcher.prepare(keyframes.submap(np.arange(low, high), origin))
+            place = _Place(reference, origin, low, keyframes.poses[low:high].copy())
         self._places[number] = place
         if len(self._places) > REFERENCES_KEPT:
             del self._places[next(iter(self._places))]

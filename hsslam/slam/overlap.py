@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from hsslam.config import Config
 from hsslam.jit import kernel
 from hsslam.matching.interface import Matcher
-from hsslam.se2 import Points, Poses, between_many, wrap
+from hsslam.se2 import Poses, between_many, wrap
 from hsslam.slam.events import Edge
+from hsslam.slam.keyframes import Keyframes
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.side_by_side import side_by_side, threads_for
 from hsslam.slam.windows import overlap_window
@@ -86,8 +87,7 @@ def nearest_apart(
 def match_pairs(
     config: Config,
     matcher: Matcher[Any],
-    points: list[Points],
-    poses: Poses,
+    keyframes: Keyframes,
     pairs: list[tuple[int, int]],
     stage: int,
 ) -> list[Edge]:
@@ -95,7 +95,7 @@ def match_pairs(
 
     The pairs, sorted, are matched side by side where the matcher can.
     """
-    rules = config.graph
+    rules, points, poses = config.graph, keyframes.points, keyframes.poses
     window = overlap_window(rules)
     groups = [(first, [pair[1] for pair in group]) for first, group in groupby(pairs, itemgetter(0))]
 

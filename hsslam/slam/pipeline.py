@@ -22,9 +22,9 @@ from hsslam.slam.events import (
     SlamResult,
     Tracked,
 )
-from hsslam.slam.free_space import FreeSpace
 from hsslam.slam.graph import PoseGraph
 from hsslam.slam.journal import Replay
+from hsslam.slam.keyframes import Keyframes
 from hsslam.slam.loops import LoopCloser
 from hsslam.slam.overlap import match_pairs, moved, overlapping_pairs
 from hsslam.slam.own_parts import OwnParts
@@ -32,7 +32,7 @@ from hsslam.slam.relocalisation import Relocalisation
 from hsslam.slam.rescan import match_scans, worth_a_match
 from hsslam.slam.scan_pairs import match_with_keyframes
 from hsslam.slam.scan_table import ScanTable
-from hsslam.slam.sessions import Sessions, chosen
+from hsslam.slam.sessions import Sessions
 from hsslam.slam.smoothing import smooth
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.tracker import TrackedScan, Tracker
@@ -122,7 +122,7 @@ class Slam:
             self._watch(recorded)
             return
         scan = self._tracker.deskewed(scan)
-        tracked = self._tracker.track(scan, scan.robot_points, self._known(scan.index))
+        tracked = self._tracker.track(scan, scan.robot_points, self._replayed(scan.index))
         lasting = self._tracker.lasting(scan.robot_points)
         newest = len(self._graph) - 1
         yield self._record(scan, newest, tracked, lasting)
@@ -179,14 +179,14 @@ class Slam:
         self._closer.release()
         yield self._optimise("final")
         with self._stopwatch.measure("final"):
-            self._forget_passers_by(graph.poses)
+            self._forget_passers_by()
         for stage in range(self._config.graph.refine_rounds):
             with self._stopwatch.measure("final"):
                 rules = self._config.graph
                 poses = graph.poses.copy()
                 sessions = self._sessions.numbers
                 pairs = overlapping_pairs(poses, rules.overlap_radius, rules.overlap_neighbours, sessions)
-                edges = match_pairs(self._config, self._matcher, self._points, poses, pairs, stage)
+                edges = match_pairs(self._config, self._matcher, self._known(), pairs, stage)
                 graph.edges = [edge for edge in graph.edges if edge.kind != "overlap"]
                 for edge in edges:
                     graph.add_edge(edge)
@@ -205,15 +205,14 @@ class Slam:
                 points, laser = scans.points[i].astype(np.float64), self._keyframes[keyframe].laser_pose
                 scans.points[i] = self._own_parts.outside(points, laser).astype(np.float32)
 
-    def _forget_passers_by(self, poses: Poses) -> None:
+    def _forget_passers_by(self) -> None:
         """Leave out, of all points, those in what turned out to be free: who walks ahead hides it while driving."""
-        lasers = [scan.laser_pose for scan in self._keyframes]
-        scans = self._scans
-        scan_poses = compose_many(poses[scans.anchors], scans.relatives)
+        known, scans = self._known(), self._scans
+        scan_poses = compose_many(known.poses[scans.anchors], scans.relatives)
         for members in self._sessions.split():
-            space = FreeSpace.seen_by(chosen(self._points, members), chosen(lasers, members), poses[members])
+            space = known.free_space(members)
             for k in members.tolist():
-                self._points[k] = space.outside(self._points[k], poses[k])
+                self._points[k] = space.outside(self._points[k], known.poses[k])
             for i in np.flatnonzero(np.isin(scans.anchors, members)).tolist():
                 lasting = space.outside(scans.points[i].astype(np.float64), scan_poses[i])
                 scans.points[i] = lasting.astype(np.float32)
@@ -221,14 +220,11 @@ class Slam:
     def _rescan(self, graph: PoseGraph, last: bool) -> None:
         """Match every scan against the finished map and its neighbours, and hang it on its keyframe anew."""
         scans, config, matcher = self._scans, self._config, self._matcher
-        sessions = self._sessions.numbers
-        known = (self._points, graph.poses, sessions, scans.points, scans.anchors, scans.relatives)
-        pairs = match_with_keyframes(config, matcher, *known)
+        pairs = match_with_keyframes(config, matcher, self._known(), scans)
         wanted = worth_a_match(scans.anchors, pairs.partners(len(scans)))
-        found, covariances, matched = match_scans(config, matcher, *known, wanted)
+        found, covariances, matched = match_scans(config, matcher, self._known(), scans, wanted)
         if last:
             # The smoother is what takes most memory of all.
-            del known
             scans.points, self._points = [], []
             give_back()
         poses = smooth(found, covariances, matched, pairs, scans.motions, scans.noises)
@@ -277,8 +273,8 @@ class Slam:
         second = len(graph) - 1
         settled = self._verifier.expire(second)
         for candidate in self._closer.candidates(graph, self._sessions):
-            known = self._replay.loops.get((candidate.first, second))
-            loop = self._closer.match(candidate, self._points, graph.poses, self._sessions, known)
+            found = self._replay.loops.get((candidate.first, second))
+            loop = self._closer.match(candidate, self._known(), found)
             self._evaluations += loop.evaluations
             settled += self._verifier.judge(loop, graph.poses)
         yield from self._settle(settled)
@@ -291,14 +287,7 @@ class Slam:
         """Look for a keyframe in the sessions that it is not in, and tie the one that it is found in to its own."""
         if self._sessions.single or not self._config.loops.enabled:
             return
-        loops = self._relocalisation.look(
-            keyframe,
-            self._keyframes,
-            self._points,
-            graph.poses,
-            self._sessions,
-            self._tracker.usual_score,
-        )
+        loops = self._relocalisation.look(keyframe, self._known(), self._tracker.usual_score)
         if not loops:
             return
         self._evaluations += sum(loop.evaluations for loop in loops)
@@ -326,7 +315,7 @@ class Slam:
             yield loop
 
     def _ambiguity(self, loop: LoopChecked) -> float:
-        return self._closer.ambiguity(loop, self._points, self._require_graph().poses, self._sessions)
+        return self._closer.ambiguity(loop, self._known())
 
     def _optimise(self, stage: str) -> Optimised:
         graph = self._require_graph()
@@ -337,7 +326,10 @@ class Slam:
             stage, before, after, int(np.count_nonzero(disbelieved & np.array(loops, dtype=np.bool_)))
         )
 
-    def _known(self, scan: int) -> TrackedScan | None:
+    def _known(self) -> Keyframes:
+        return Keyframes(self._keyframes, self._points, self._require_graph().poses, self._sessions)
+
+    def _replayed(self, scan: int) -> TrackedScan | None:
         t = self._replay.tracked.get(scan)
         return None if t is None else TrackedScan(t.relative, t.covariance, t.score, t.matched, t.evaluations)
 

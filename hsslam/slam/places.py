@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,15 +11,12 @@ from numpy.typing import NDArray
 
 from hsslam.config import Config
 from hsslam.matching.interface import Matcher, SearchWindow
-from hsslam.scan import LaserScan
-from hsslam.se2 import Points, Pose, Poses, between_many
+from hsslam.se2 import Points, Pose, Poses
 from hsslam.slam.events import LoopChecked
 from hsslam.slam.far import NEAR, FarSearch
-from hsslam.slam.free_space import FreeSpace
 from hsslam.slam.fusion import largest_variance
+from hsslam.slam.keyframes import Keyframes
 from hsslam.slam.randomness import Purpose, generator
-from hsslam.slam.sessions import Sessions
-from hsslam.slam.submap import merge
 from hsslam.slam.tracker import ANYWHERE
 from hsslam.slam.windows import match_within, search_window
 
@@ -65,9 +61,8 @@ class PlaceSearch:
         Of loops.
     keyframe : int
         The one that is looked for.
-    keyframes, points, poses, sessions
-        Of all keyframes: their scans, their (N_i, 2) points (m), each in its own frame, where they are, (K, 3), and
-        which session they belong to.
+    keyframes : Keyframes
+        All of them.
     """
 
     def __init__(
@@ -75,32 +70,28 @@ class PlaceSearch:
         config: Config,
         matcher: Matcher[Any],
         keyframe: int,
-        keyframes: Sequence[LaserScan],
-        points: Sequence[Points],
-        poses: Poses,
-        sessions: Sessions,
+        keyframes: Keyframes,
     ) -> None:
-        self._keyframes = keyframes
-        self.keyframe = keyframe
         self._config = config
         self._matcher = matcher
-        self._points = points
-        self.sessions = sessions
-        self.poses = poses
-        self.foreign = sessions.foreign(keyframe)
+        self._keyframes = keyframes
+        self.keyframe = keyframe
+        self.sessions = keyframes.sessions
+        self.poses = keyframes.poses
+        self.foreign = self.sessions.foreign(keyframe)
         self.others = np.flatnonzero(self.foreign)
-        self.start = sessions.start(keyframe)
+        self.start = self.sessions.start(keyframe)
 
     def coarsely(self, first: int, least: float) -> tuple[Pose, float]:
         """Where around another keyframe it fits best, seen from there, and how well: 0 if not as well as ``least``."""
-        scan = self._points[self.keyframe]
+        scan = self._keyframes.points[self.keyframe]
         return FarSearch(self._submap(first)).look(scan, np.zeros(3), EVERYWHERE, least)
 
     def match(self, first: int, guess: Pose, usual: float) -> Answer | None:
         """The keyframe near where ``guess`` says it is, seen from another; None where it does not belong there."""
         rng = generator(self._config.seed, Purpose.RELOCALISE, first, self.keyframe)
         tile = search_window(self._config.tracker.window)
-        scan, reference = self._points[self.keyframe], self._matcher.prepare(self._submap(first))
+        scan, reference = self._keyframes.points[self.keyframe], self._matcher.prepare(self._submap(first))
         found = match_within(self._matcher, reference, scan, guess, NEAR, tile, rng)
         open_ended = largest_variance(found.covariance) > self._config.loops.max_std**2
         if open_ended or not found.converged or found.score < EXPLAINED:
@@ -125,13 +116,8 @@ class PlaceSearch:
 
     def _known(self, first: int, pose: Pose) -> tuple[float, float]:
         """Shares of the keyframe's returns that lie where a place is known, and where it is known to be empty."""
-        around, place = self._around(first), self.poses[first]
-        space = FreeSpace.seen_by(
-            [self._points[k] for k in around.tolist()],
-            [self._keyframes[k].laser_pose for k in around.tolist()],
-            between_many(np.tile(place, (len(around), 1)), self.poses[around]),
-        )
-        scan = self._points[self.keyframe]
+        space = self._keyframes.free_space(self._around(first), self.poses[first])
+        scan = self._keyframes.points[self.keyframe]
         new, conflicting = space.lacks(scan, pose), space.holds(scan, pose)
         return max(1.0 - float(new.mean()), EXPLAINED), float(conflicting.mean())
 
@@ -145,9 +131,7 @@ class PlaceSearch:
 
     def _submap(self, first: int) -> Points:
         """Points of what is known around a keyframe, in its frame."""
-        chosen = self._around(first)
-        points = [self._points[keyframe] for keyframe in chosen.tolist()]
-        return merge(points, self.poses[chosen], self.poses[first])
+        return self._keyframes.submap(self._around(first), self.poses[first])
 
     def _around(self, first: int) -> NDArray[np.int64]:
         """Keyframes that saw a place, none like another."""

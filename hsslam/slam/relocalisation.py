@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import Any
@@ -12,12 +11,11 @@ import numpy as np
 
 from hsslam.config import Config
 from hsslam.matching.interface import Matcher
-from hsslam.scan import LaserScan
-from hsslam.se2 import Points, Pose, Poses, between, compose, inverse
+from hsslam.se2 import Pose, Poses, between, compose, inverse
 from hsslam.slam.events import LoopChecked
 from hsslam.slam.fusion import of_inverse
+from hsslam.slam.keyframes import Keyframes
 from hsslam.slam.places import APART, Answer, PlaceSearch, distances
-from hsslam.slam.sessions import Sessions
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.windows import differences
 
@@ -162,25 +160,15 @@ class Relocalisation:
         self._refuted: list[Guess] = []
         self._next = 0
 
-    def look(
-        self,
-        keyframe: int,
-        keyframes: Sequence[LaserScan],
-        points: Sequence[Points],
-        poses: Poses,
-        sessions: Sessions,
-        usual: float,
-    ) -> list[LoopChecked]:
+    def look(self, keyframe: int, keyframes: Keyframes, usual: float) -> list[LoopChecked]:
         """Look for a keyframe in the sessions that it does not belong to.
 
         Parameters
         ----------
         keyframe : int
             One that follows the last that was looked for, or the first of a session.
-        keyframes, points, poses : sequence of LaserScan, sequence of Points, Poses
-            All keyframes, their (N_i, 2) points (m), each in its own frame, and where they are, (K, 3).
-        sessions : Sessions
-            Of every keyframe.
+        keyframes : Keyframes
+            All of them.
         usual : float
             What the last scans scored where they were tracked.
 
@@ -190,8 +178,7 @@ class Relocalisation:
             Once the robot's place is known: loops between keyframes of both sessions that say so, all accepted.
         """
         with self._stopwatch.measure("relocalisation"):
-            search = PlaceSearch(self._config, self._matcher, keyframe, keyframes, points, poses, sessions)
-            return self._look(search, usual)
+            return self._look(PlaceSearch(self._config, self._matcher, keyframe, keyframes), usual)
 
     def _look(self, search: PlaceSearch, usual: float) -> list[LoopChecked]:
         foreign = search.foreign

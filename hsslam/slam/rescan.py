@@ -6,7 +6,6 @@ While a run goes on a scan meets the submap of the moment; at the end there is a
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,9 +16,10 @@ from hsslam.matching.interface import Matcher, Reference, SearchWindow
 from hsslam.matching.results import MatchResult
 from hsslam.se2 import Points, Pose, Poses, between_many, compose_many
 from hsslam.slam.fusion import rotated
+from hsslam.slam.keyframes import Keyframes
 from hsslam.slam.randomness import Purpose, generator
+from hsslam.slam.scan_table import ScanTable
 from hsslam.slam.side_by_side import side_by_side, threads_for
-from hsslam.slam.submap import merge
 from hsslam.slam.windows import AGREEING, at_edges, differences, known_within, overlap_window
 
 BLOCK = 4
@@ -80,12 +80,8 @@ def worth_a_match(anchors: NDArray[np.int64], partners: NDArray[np.int64]) -> ND
 def match_scans(
     config: Config,
     matcher: Matcher[Any],
-    keyframe_points: Sequence[Points],
-    poses: Poses,
-    sessions: NDArray[np.int64],
-    scans: Sequence[NDArray[np.float32]],
-    anchors: NDArray[np.int64],
-    relatives: Poses,
+    keyframes: Keyframes,
+    scans: ScanTable,
     wanted: NDArray[np.bool_],
 ) -> tuple[Poses, NDArray[np.float64], NDArray[np.bool_]]:
     """Match scans against the surroundings of the keyframes they hang on.
@@ -96,14 +92,10 @@ def match_scans(
         Its ``graph`` section and its seed.
     matcher : Matcher
         The tracker's.
-    keyframe_points, poses, sessions : sequence, Poses, int64 (K,)
-        Of the keyframes; poses as optimised.
-    scans : sequence of float32 (N_i, 2)
-        Returns of every scan in the robot's frame (m).
-    anchors : int64 (S,)
-        Number of the keyframe each scan hangs on; ascending.
-    relatives : Poses
-        (S, 3) each scan seen from that keyframe.
+    keyframes : Keyframes
+        As optimised.
+    scans : ScanTable
+        Their points, and where each was tracked.
     wanted : bool (S,)
         Which of them to match; the others stay where they are.
 
@@ -114,7 +106,8 @@ def match_scans(
     """
     rules = config.graph
     window = overlap_window(rules)
-    found = compose_many(poses[anchors], relatives)
+    poses, sessions, anchors = keyframes.poses, keyframes.sessions.numbers, scans.anchors
+    found = compose_many(poses[anchors], scans.relatives)
     covariances = np.zeros((len(scans), 3, 3))
     matched = np.zeros(len(scans), dtype=np.bool_)
 
@@ -127,9 +120,9 @@ def match_scans(
         around = surrounding(poses, sessions, first, last, rules.overlap_radius, rules.rescan_keyframes)
         origin: Pose = poses[(first + last) // 2].copy()
         origins = np.tile(origin, (len(chosen), 1))
-        reference = matcher.prepare(merge([keyframe_points[k] for k in around], poses[around], origin))
+        reference = matcher.prepare(keyframes.submap(around, origin))
         guesses, rng = between_many(origins, found[chosen]), generator(config.seed, Purpose.SCAN, first)
-        points = [scans[i].astype(np.float64) for i in chosen]
+        points = [scans.points[i].astype(np.float64) for i in chosen]
         results = matcher.match_many(reference, points, guesses, window, rng)
         for k in np.flatnonzero(_apart(results.poses, guesses, AWAY)).tolist():
             near = _confirmed(matcher, reference, points[k], guesses[k], window, results.scores[k], rng)

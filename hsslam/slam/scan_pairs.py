@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from hsslam.config import Config
 from hsslam.matching.interface import Matcher
 from hsslam.matching.results import Matches
-from hsslam.se2 import Points, Pose, Poses, between_many, compose_many
+from hsslam.se2 import Pose, between_many, compose_many
+from hsslam.slam.keyframes import Keyframes
 from hsslam.slam.randomness import Purpose, generator
-from hsslam.slam.scan_table import Rows
+from hsslam.slam.scan_table import Rows, ScanTable
 from hsslam.slam.side_by_side import side_by_side, threads_for
 from hsslam.slam.windows import at_edges, differences, overlap_window
 
@@ -57,14 +58,7 @@ class ScanPairs:
 
 
 def match_with_keyframes(
-    config: Config,
-    matcher: Matcher[Any],
-    keyframe_points: Sequence[Points],
-    poses: Poses,
-    sessions: NDArray[np.int64],
-    scans: Sequence[NDArray[np.float32]],
-    anchors: NDArray[np.int64],
-    relatives: Poses,
+    config: Config, matcher: Matcher[Any], keyframes: Keyframes, scans: ScanTable
 ) -> ScanPairs:
     """Match every scan against ``graph.rescan_neighbours`` keyframes before it, and as many after it.
 
@@ -81,7 +75,8 @@ def match_with_keyframes(
     if not reach:
         return pairs
     window = overlap_window(rules)
-    tracked = compose_many(poses[anchors], relatives)
+    poses, sessions, anchors = keyframes.poses, keyframes.sessions.numbers, scans.anchors
+    tracked = compose_many(poses[anchors], scans.relatives)
     # The scan that became a keyframe is the first that hangs on it.
     starts = np.append(np.searchsorted(anchors, np.arange(len(poses))), len(scans)).tolist()
 
@@ -93,8 +88,8 @@ def match_with_keyframes(
             return others, Matches.of([])
         guesses = between_many(np.tile(poses[k], (len(others), 1)), tracked[others])
         rng = generator(config.seed, Purpose.PAIR, own)
-        points = [scans[i].astype(np.float64) for i in others]
-        found = matcher.match_many(matcher.prepare(keyframe_points[k]), points, guesses, window, rng)
+        points = [scans.points[i].astype(np.float64) for i in others]
+        found = matcher.match_many(matcher.prepare(keyframes.points[k]), points, guesses, window, rng)
         good = found.converged & (found.scores >= rules.overlap_min_score)
         good &= ~at_edges(differences(found.poses, guesses), window)
         return [others[i] for i in np.flatnonzero(good)], found.only(good)
