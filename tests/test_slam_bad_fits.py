@@ -15,7 +15,8 @@ from hsslam.matching import Estimate, Matcher, MatcherConfig
 from hsslam.matching.interface import Reference, SearchWindow
 from hsslam.matching.results import MatchResult
 from hsslam.se2 import Points, Pose
-from hsslam.slam.locator import Expectation, Locator
+from hsslam.slam.expectation import Expectation
+from hsslam.slam.locator import Locator
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import GrowingSubmap
 

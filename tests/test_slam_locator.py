@@ -11,7 +11,8 @@ from hsslam.config import TrackerSection
 from hsslam.matching.interface import Matcher, MatcherConfig, Reference, SearchWindow
 from hsslam.matching.results import Estimate
 from hsslam.se2 import Points, Pose, pose, transform
-from hsslam.slam.locator import Expectation, Locator
+from hsslam.slam.expectation import Expectation
+from hsslam.slam.locator import Locator
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import GrowingSubmap
 

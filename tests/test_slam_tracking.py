@@ -15,7 +15,7 @@ from hsslam.config import load_config
 from hsslam.datasets.simulator import SimulatedDataset, raycast
 from hsslam.matching.interface import SearchWindow
 from hsslam.scan import LaserScan, ScanGeometry
-from hsslam.se2 import between_many, interpolate, pose
+from hsslam.se2 import between_many, compose, interpolate, pose
 from hsslam.slam.events import Tracked
 from hsslam.slam.pipeline import Slam
 from hsslam.slam.windows import foreseen_window
@@ -185,6 +185,25 @@ def test_a_robot_in_a_bare_corridor_goes_where_odometry_leaps_to() -> None:
             (event, *_) = slam.process(LaserScan(float(i), ranges, geometry, odometry, index=i))
             assert isinstance(event, Tracked)
         assert event.pose[0] == pytest.approx(odometry[0], abs=0.1)
+
+
+@pytest.mark.parametrize("turn", [-100.0, -90.0, 80.0, 95.0])
+def test_a_jump_of_odometry_does_not_turn_the_robot_round(turn: float) -> None:
+    """An all-round laser sees a corridor the same both ways: of the two, the robot looks the way that it went."""
+    walls = np.array([[-60.0, -1.2, 60.0, -1.2], [-60.0, 1.2, 60.0, 1.2]])
+    geometry = ScanGeometry(-math.pi, math.radians(1.0), range_max=12.0)
+    jump = pose(-0.6, 0.0, math.radians(turn))
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        slam = Slam(load_config(overrides=[f"seed={seed}"]))
+        for i in range(9):
+            truth = pose(0.1 * i, 0.0, 0.0)
+            ranges = raycast(walls, truth, geometry, 360) + 0.01 * rng.standard_normal(360)
+            odometry = compose(compose(pose(0.6, 0.0, 0.0), jump), pose(0.1 * (i - 6), 0.0, 0.0))
+            told = odometry if i >= 6 else truth
+            (event, *_) = slam.process(LaserScan(0.1 * i, ranges, geometry, told, index=i))
+            assert isinstance(event, Tracked)
+            assert abs(event.pose[2]) < math.radians(5.0)
 
 
 def corridor_with_doors(rng: np.random.Generator) -> NDArray[np.float64]:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hsslam.config import TrackerSection
 from hsslam.kernels.assess import assess
@@ -16,15 +15,13 @@ from hsslam.matching.results import MatchResult
 from hsslam.se2 import Points, Pose
 from hsslam.search.polish import scan_lines
 from hsslam.search.slide import weak_direction
-from hsslam.slam.fusion import GATE, squared_mahalanobis
-from hsslam.slam.motion import way
+from hsslam.slam.expectation import USUAL, Expectation
 from hsslam.slam.stopwatch import Stopwatch
 from hsslam.slam.submap import GrowingSubmap
 from hsslam.slam.windows import (
     AGREEING,
     at_edge,
     difference,
-    foreseen_window,
     known_within,
     match_within,
     search_window,
@@ -43,29 +40,14 @@ MUCH = 0.15
 SETTLINGS = 4
 """How often an answer is followed to the edge of the window around it, at most."""
 
-USUAL = 0.05
-"""A scan fits as usual if its score is no further than this below those of the last scans."""
-
 UNFIT = 0.15
 """A scan fits badly if its score is this far below those of the last scans."""
-
-RECOVERY_GAIN = 0.12
-"""Odometry is overruled only by an answer whose score is this much higher: people who walk along see no motion."""
-
-LEAP_GAIN = 0.06
-"""By this much, where odometry leaps and the answer goes on as the robot went."""
 
 DOUBTFUL = 0.1
 """Odometry is doubtful along an open direction where its variance is more than this share of the answer's."""
 
 OPEN_STD = 10.0
 """Standard deviation (m) along a direction of which the returns tell nothing."""
-
-UNLIKE = 0.1
-"""Odometry's motion is unlike the last one where it leads this far (m + rad) from where that leads."""
-
-IMPOSSIBLE = 1.0
-"""By none at all, where odometry leaps further than this (m + rad) from where the robot was going."""
 
 FEW = 6
 """An answer elsewhere explains more than the first by at least as many returns: few of them fit somewhere always."""
@@ -75,62 +57,6 @@ FARTHER = 7.0
 
 AT_REST = 0.01
 """Standard deviation (m, rad) that any answer may have."""
-
-STEADY = 2.0
-"""This many times as much where odometry goes on as the robot went, and the answer does not: robots do not leap."""
-
-
-@dataclass(frozen=True, eq=False)
-class Expectation:
-    """What is known of a scan's pose before it is matched.
-
-    Attributes
-    ----------
-    pose : Pose
-        Where odometry says that it is, in the submap.
-    covariance : float64 (3, 3)
-        Of that pose (m^2, rad^2).
-    repeated : Pose
-        Where it is if the robot moved as it did before.
-    told : bool
-        Whether odometry tells of motion: an outage looks like a robot at rest, and cannot be contradicted.
-    leaps : bool
-        Whether odometry's motion is unlike the one before.
-    score : float
-        What the last scans scored.
-    paused : bool
-        Whether the recording paused: the robot may have been moved meanwhile, and odometry not know of it.
-    """
-
-    pose: Pose
-    covariance: NDArray[np.float64]
-    repeated: Pose
-    told: bool
-    leaps: bool
-    score: float
-    paused: bool = False
-
-    def window(self, least: SearchWindow, most: SearchWindow) -> SearchWindow:
-        """As far as the truth may be from the expected pose, between two other windows."""
-        variances = self.covariance
-        return foreseen_window(max(variances[0, 0], variances[1, 1]), variances[2, 2], least, most)
-
-    @property
-    def goes_on(self) -> bool:
-        """Whether odometry goes on as the robot went: no message of it is late."""
-        return way(self.pose, self.repeated) <= UNLIKE
-
-    def belies(self, found: MatchResult) -> bool:
-        """Whether an answer fits less than usual, and the robot did not go on: a message of odometry may be late."""
-        return found.score < self.score - USUAL and not self.goes_on
-
-    def least_gain(self, found: Pose) -> float:
-        """By how much an answer must score higher to overrule odometry: it matters which goes on as the robot went."""
-        if not self.told:
-            return RECOVERY_GAIN
-        if way(self.pose, self.repeated) < way(found, self.repeated):
-            return STEADY * RECOVERY_GAIN
-        return LEAP_GAIN if self.leaps else RECOVERY_GAIN
 
 
 class Locator:
@@ -190,19 +116,19 @@ class Locator:
             with self._stopwatch.measure("recover"):
                 found = self._look_further(expected, found)
         if expected.told and (
-            contradicts(found, expected) or self._unusual(found) or self._drawn_back(expected)
+            expected.contradicts(found) or self._unusual(found) or self._drawn_back(expected)
         ):
             with self._stopwatch.measure("recover"):
                 found = self._agree(expected, found)
         if self._doubtful(found):
             with self._stopwatch.measure("recover"):
                 found = self._recover(expected, found)
-        elif found.score < 1.0 and (expected.leaps or expected.belies(found)):
+        elif expected.leaps or expected.belies(found):
             with self._stopwatch.measure("recover"):
                 found = self._steadier(expected, found)
         if self._open_direction(found) is not None:
             found = self._left_open(expected, found)
-        if expected.told and found.score < expected.score - UNFIT and contradicts(found, expected):
+        if expected.told and found.score < expected.score - UNFIT and expected.contradicts(found):
             found = _unsure(found, expected)
         return replace(found, evaluations=self._evaluations)
 
@@ -295,8 +221,10 @@ class Locator:
 
     def _steadier(self, expected: Expectation, first: MatchResult) -> MatchResult:
         """Where odometry leaps or is late, try the last motion once more: that may reach further than any window."""
+        gain = expected.steady_gain(first.pose)
+        if first.score >= 1.0 and gain >= 0.0:
+            return first
         best = self._match(expected.repeated, self._window)
-        gain = LEAP_GAIN if way(expected.pose, expected.repeated) < IMPOSSIBLE else 0.0
         better = best.converged and self._fit(best) > self._fit(first) + gain
         return best if better else first
 
@@ -380,9 +308,3 @@ def _unsure(result: MatchResult, expected: Expectation) -> MatchResult:
     """An answer that fits badly and denies odometry, with what is between the two as its deviation."""
     off = difference(result.pose, expected.pose)
     return replace(result, covariance=result.covariance + np.outer(off, off))
-
-
-def contradicts(result: MatchResult, expected: Expectation) -> bool:
-    """Whether a match and the expectation cannot both be right."""
-    off = difference(result.pose, expected.pose)
-    return result.converged and squared_mahalanobis(off, expected.covariance + result.covariance) > GATE

@@ -14,8 +14,9 @@ from hsslam.config import Config
 from hsslam.matching.interface import Matcher
 from hsslam.scan import LaserScan
 from hsslam.se2 import Points, Pose, Poses, between, compose
+from hsslam.slam.expectation import Expectation
 from hsslam.slam.fusion import fuse, rotated
-from hsslam.slam.locator import UNFIT, Expectation, Locator, contradicts
+from hsslam.slam.locator import UNFIT, Locator
 from hsslam.slam.motion import MotionModel
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.sessions import Pause
@@ -200,7 +201,7 @@ class Tracker:
         )
         explained = result.score * len(points)
         matched = result.converged and result.score >= rules.min_score and explained >= LEAST_RETURNS
-        if matched and contradicts(result, expected):
+        if matched and expected.contradicts(result):
             matched = float(np.hypot(*np.ptp(points, axis=0))) >= LEAST_EXTENT
         if not matched:
             pose, covariance = predicted, prior
