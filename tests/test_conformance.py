@@ -216,7 +216,27 @@ class ManyFewer(Hide):
         return found.only(found.converged)
 
 
+class Forgets(Hide):
+    """Knows the newest scan only."""
+
+    summary = "overrides extend"
+
+    def extend(self, reference, points):
+        return self.prepare(points)
+
+
+class Misplaces(Hide):
+    """Adds every scan a little further away."""
+
+    summary = "overrides extend"
+
+    def extend(self, reference, points):
+        return super().extend(reference, points + 0.1 * (1.0 + len(reference.points) / 90.0))
+
+
 BAD = [
+    (Forgets, "extend"),
+    (Misplaces, "extend"),
     (ManyOthers, "many"),
     (ManyFewer, "many"),
     (Lazy, "accuracy"),

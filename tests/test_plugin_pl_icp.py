@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hsslam.config import load_config
 from hsslam.datasets.simulator import SimulatedDataset
 from hsslam.errors import ConfigError
 from hsslam.matching import SearchWindow, create
 from hsslam.se2 import between
+from hsslam.slam.pipeline import Slam
 
 WINDOW = SearchWindow(0.2, 0.2, np.radians(10.0))
 
@@ -68,3 +70,10 @@ def test_a_pose_that_swings_by_millimetres_has_converged() -> None:
 def test_settings_that_make_no_sense(parameters, message) -> None:
     with pytest.raises(ConfigError, match=message):
         create("pl_icp", parameters)
+
+
+def test_slam_finds_the_same_twice() -> None:
+    """Of a submap that grew, lines were looked up by the numbers of another one's: some lay beyond the last."""
+    scans = list(SimulatedDataset("office", seed=2, scans=120).scans())
+    first, second = (Slam(load_config(overrides=["matcher=pl_icp"])).solve(scans) for _ in range(2))
+    assert np.array_equal(first.trajectory.poses, second.trajectory.poses)

@@ -118,7 +118,10 @@ class Reference:
         return self._surface
 
     def adopt(self, surface: Surface) -> None:
-        """Take a surface through the points that somebody else made."""
+        """Take a surface through the points that somebody else made.
+
+        Its segments may be numbered otherwise: what a plugin keeps that numbers them goes with the surface it is of.
+        """
         self._surface = surface
 
 
@@ -169,7 +172,8 @@ class Matcher(ABC, Generic[ConfigT]):
         """Add one more scan's (N, 2) points, in the reference's frame, to what `prepare` made.
 
         Takes the reference over: what is returned replaces it, and it must not be used any more. A submap that
-        grows scan by scan costs little this way. Made anew here; a plugin whose index can grow overrides it.
+        grows scan by scan costs little this way. Made anew here, but for the surface, which grows (`Reference.adopt`);
+        a plugin whose index can grow, or is of the surface's segments, overrides it.
         """
         points = clean(points)
         grown = self.prepare(np.vstack((reference.points, points)))

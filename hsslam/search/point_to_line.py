@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.kernels.refine import NO_LINES, refine
-from hsslam.kernels.surface import rasterise_nearest
+from hsslam.kernels.surface import Surface, rasterise_nearest
 from hsslam.matching.interface import Reference
 from hsslam.se2 import Points, Pose
 
@@ -26,10 +26,12 @@ class PointToLineReference(Reference):
         (N, 2) m in beam order.
     reach : float
         How far from the surface (m).
+    surface : Surface, optional
+        Through the points, where it is known.
     """
 
-    def __init__(self, points: Points, reach: float) -> None:
-        super().__init__(points)
+    def __init__(self, points: Points, reach: float, surface: Surface | None = None) -> None:
+        super().__init__(points, surface)
         self.far: NDArray[np.uint32]
         self.far_frame: NDArray[np.float64]
         self.far, self.far_frame = rasterise_nearest(self.surface.segments, RESOLUTION, reach)

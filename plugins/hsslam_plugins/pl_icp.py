@@ -55,6 +55,12 @@ class PlIcp(Matcher[PlIcpConfig]):
         """Fit lines, and find the nearest of them everywhere; see `hsslam.matching.Matcher.prepare`."""
         return PointToLineReference(clean(points), self.config.distance_start)
 
+    def extend(self, reference: Reference, points: Points) -> PointToLineReference:
+        """Find the nearest line anew, the added ones among them; see `hsslam.matching.Matcher.extend`."""
+        points = clean(points)
+        every = np.vstack((reference.points, points))
+        return PointToLineReference(every, self.config.distance_start, reference.surface.extended(points))
+
     def estimate(
         self,
         reference: Reference,

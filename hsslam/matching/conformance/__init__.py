@@ -42,6 +42,7 @@ _CHECKS: tuple[Check, ...] = (
     answers.check_determinism,
     answers.check_threads,
     answers.check_many,
+    answers.check_extend,
     inputs.check_inputs_untouched,
     inputs.check_array_layouts,
     inputs.check_not_finite_rows,

@@ -195,3 +195,26 @@ def check_many(matcher: Matcher[Any]) -> None:
                 and found.converged[k] == single.converged
             )
             require(same, f"match_many: pose {found.poses[k]}, where match finds {single.pose}")
+
+
+def check_extend(matcher: Matcher[Any]) -> None:
+    """A reference that grew scan by scan serves as well as one of all its points."""
+    rooms = [room_pair(seed) for seed in range(3)]
+    # Each of three scans adds a part of the room that the others leave out.
+    parts = [transform(room.truth, room.scan)[80 * i : 80 * i + 90] for i, room in enumerate(rooms)]
+    distances, rotations, last = [], [], room_pair(3)
+    starts = guesses(last.truth, WINDOW.half, TRIALS)
+    for seed, guess in enumerate(starts):
+        answers = []
+        for _ in range(2):
+            grown = matcher.prepare(parts[0])
+            for part in parts[1:]:
+                grown = matcher.extend(grown, part)
+            answers.append(matcher.match(grown, last.scan, guess, WINDOW, generator(seed)))
+        require_equal(answers[0], answers[1], "extend: the same scans added to the same reference")
+        distance, rotation = apart(answers[0].pose, last.truth)
+        distances.append(distance)
+        rotations.append(rotation)
+    count = sum(map(len, parts))
+    require(len(grown.points) == count, f"extend: {len(grown.points)} points of {count} are in the reference")
+    require_close(distances, rotations, "off the truth in a reference that grew from three scans")
