@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hsslam.kernels.blocks import (
+    ASIDE,
     LANES,
     LEAST_AGREEMENT,
     TERMS,
@@ -35,8 +36,19 @@ def room(count: int, seed: int) -> Points:
     return noisy
 
 
+def two_rooms() -> Surface:
+    """The room, and from beyond its thin wall, in the order of a robot's beams there, the other side 6 cm behind."""
+    beyond = np.column_stack((np.full(40, 1.06), np.linspace(0.4, -0.4, 40)))
+    return Surface.build(np.concatenate((room(180, 0), beyond)))
+
+
 def sums(
-    surface: Surface, points: Points, lines: NDArray[np.float64], variances: NDArray[np.float64], pose: Pose
+    surface: Surface,
+    points: Points,
+    lines: NDArray[np.float64],
+    variances: NDArray[np.float64],
+    pose: Pose,
+    agreement: float = -LEAST_AGREEMENT,
 ) -> NDArray[np.float64]:
     """By the kernels, all blocks."""
     half, blocks, known = blocks_of(points, lines)
@@ -45,7 +57,7 @@ def sums(
     x0, y0, c, s = pose[0], pose[1], math.cos(pose[2]), math.sin(pose[2])
     for block in range(2 * half):
         find_segments(surface.pieces, surface.nearest, surface.frame, x0, y0, c, s, block, blocks, known)
-        add_terms(x0, y0, c, s, DISTANCE**2, SCALE**2, LEAST, len(lines) > 0, block, blocks, out)
+        add_terms(x0, y0, c, s, DISTANCE**2, SCALE**2, LEAST, agreement, len(lines) > 0, block, blocks, out)
     total: NDArray[np.float64] = out.reshape(TERMS, LANES).sum(axis=1)
     return total
 
@@ -59,22 +71,34 @@ def added(
     return np.concatenate((hessian[np.triu_indices(3)], rows.T @ (weights * residuals)))
 
 
+def nearest_of(surface: Surface, places: Points) -> NDArray[np.int64]:
+    return np.array([nearest_segment(surface.nearest, surface.frame, *place) for place in places])
+
+
 def twin(
-    surface: Surface, points: Points, lines: NDArray[np.float64], variances: NDArray[np.float64], pose: Pose
+    surface: Surface,
+    points: Points,
+    lines: NDArray[np.float64],
+    variances: NDArray[np.float64],
+    pose: Pose,
+    least: float = -LEAST_AGREEMENT,
 ) -> NDArray[np.float64]:
     """By NumPy: both distances of each point, their weights and derivatives."""
     places = transform(pose, points)
-    numbers = np.array([nearest_segment(surface.nearest, surface.frame, *place) for place in places])
+    own = np.zeros_like(places)
+    if len(lines):
+        own = transform(np.array([0.0, 0.0, pose[2]]), lines[:, :2])
+    numbers = nearest_of(surface, places)
+    other_side = (numbers >= 0) & ((own * surface.pieces[numbers, 5:7]).sum(axis=1) < -LEAST_AGREEMENT)
+    aside = nearest_of(surface, places + ASIDE * own)
+    numbers = np.where(other_side & (aside >= 0), aside, numbers)
     pieces = surface.pieces[numbers]
     begins, alongs, normals = pieces[:, 0:2], pieces[:, 2:4], pieces[:, 5:7]
     reached = np.clip(((places - begins) * alongs).sum(axis=1), 0.0, pieces[:, 4])
     feet = begins + reached[:, None] * alongs
     counts = (numbers >= 0) & (np.hypot(*(places - feet).T) <= DISTANCE)
-    own = np.zeros_like(normals)
-    if len(lines):
-        own = transform(np.array([0.0, 0.0, pose[2]]), lines[:, :2])
     agreement = (own * normals).sum(axis=1)
-    counts &= agreement >= -LEAST_AGREEMENT
+    counts &= (agreement >= least) | ~own.any(axis=1)
     beams = places - pose[:2]
 
     residuals = (normals * places).sum(axis=1) - pieces[:, 7]
@@ -89,15 +113,36 @@ def twin(
     return np.append(total, counts.sum())
 
 
-@given(st.integers(1, 200), st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(-3.1, 3.1), st.booleans())
+@given(
+    st.integers(1, 200),
+    st.floats(-0.1, 0.1),
+    st.floats(-0.1, 0.1),
+    st.floats(-3.1, 3.1),
+    st.booleans(),
+    st.sampled_from([-LEAST_AGREEMENT, LEAST_AGREEMENT]),
+)
 @settings(deadline=None, max_examples=60)
-def test_blocks_sum_up_what_numpy_sums_up(count: int, x: float, y: float, theta: float, both: bool) -> None:
-    surface, points, pose = Surface.build(room(180, 0)), room(count, 1), np.array([x, y, theta])
+def test_blocks_sum_up_what_numpy_sums_up(
+    count: int, x: float, y: float, theta: float, both: bool, least: float
+) -> None:
+    surface, points, pose = two_rooms(), room(count, 1), np.array([x, y, theta])
     points = points - [0.3, 0.0]
     lines = lines_of(points, FIT_SPAN, FIT_ROUGHNESS) if both else np.empty((0, 3))
     variances = np.random.default_rng(count).uniform(1.0, 3.0, count)
-    expected = twin(surface, points, lines, variances, pose)
-    assert sums(surface, points, lines, variances, pose) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    expected = twin(surface, points, lines, variances, pose, least)
+    assert sums(surface, points, lines, variances, pose, least) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+def test_returns_beyond_the_middle_of_a_thin_wall_are_of_the_side_that_they_were_seen_from() -> None:
+    """Without them that side lies nearer than it is."""
+    surface = two_rooms()
+    for depth, counts in ((0.0, True), (0.04, True), (0.06, True), (0.13, False)):
+        points = np.column_stack((np.full(41, 1.0 + depth), np.linspace(-0.2, 0.2, 41)))
+        lines = lines_of(points, FIT_SPAN, FIT_ROUGHNESS)
+        found = sums(surface, points, lines, np.ones(41), np.zeros(3))
+        assert (found[-1] == 41) == counts
+        # Half the sum of squares falls towards the side at 1 m.
+        assert (found[6] > 1.0) == (counts and depth > 0.0)
 
 
 def test_lanes_without_a_point_count_nowhere() -> None:

@@ -37,11 +37,19 @@ points that count."""
 
 XX, XY, XT, YY, YT, TT, GX, GY, GT, USED = (np.uint64(LANES * term) for term in range(TERMS))
 
+AGAIN = -2
+"""Instead of a segment's number: whatever is nearest, it is to be looked up."""
+
 NOWHERE = 1e30
 """Coordinate of a lane without a point (m): no segment is near."""
 
 LEAST_AGREEMENT = 0.5
 """Cosine of the angle between two lines that may be of the same surface, at least."""
+
+ASIDE = 0.08
+"""How far before a point its segment is looked for where the nearest is of the other side of a wall (m). Returns that
+noise carries beyond the middle of a thin wall belong to the side that they were seen from: without them it would lie
+nearer than it is."""
 
 
 @kernel
@@ -66,7 +74,7 @@ def blocks_of(
     blocks : float64 (2 * half * BLOCK,)
         The blocks, one after the other. Lanes without a point are nowhere.
     known : int64 (2 * half * LANES,)
-        Numbers of the segments that are in the blocks: none, -1.
+        Numbers of the segments that are in the blocks: none, -1; or `AGAIN`.
     """
     n = points.shape[0]
     half = (n + 2 * LANES - 1) // (2 * LANES)
@@ -143,6 +151,17 @@ def find_segments(
         if k == known[slot]:
             continue
         known[slot] = k
+        if k >= 0:
+            lx, ly = blocks[at + np.uint64(LINE_X)], blocks[at + np.uint64(LINE_Y)]
+            mx, my = c * lx - s * ly, s * lx + c * ly
+            if pieces[np.uint64(k), 5] * mx + pieces[np.uint64(k), 6] * my < -LEAST_AGREEMENT:
+                # Which one is before the point may change while the nearest stays: it is asked again.
+                known[slot] = AGAIN
+                u, v = u + ASIDE * mx * frame[2], v + ASIDE * my * frame[2]
+                if u >= 0.0 and v >= 0.0 and u < width and v < height:
+                    key = nearest[np.uint64(v), np.uint64(u)]
+                    if key != EMPTY:
+                        k = int(key) & number
         blocks[at + np.uint64(NEAR)] = 1.0 if k >= 0 else 0.0
         if k >= 0:
             for value in range(8):
@@ -158,6 +177,7 @@ def add_terms(
     squared_distance: float,
     squared_scale: float,
     least: float,
+    agreement_least: float,
     both: bool,
     block: int,
     blocks: NDArray[np.float64],
@@ -175,6 +195,8 @@ def add_terms(
         Of the Cauchy weight (m^2).
     least : float
         The least squared cosine between beam and normal, see `hsslam.kernels.variances`.
+    agreement_least : float
+        Cosine of the angle between a point's line, if it has one, and its segment's, at least.
     both : bool
         Whether the places on the segments are to lie on the scan's lines, too.
     block : int
@@ -201,7 +223,8 @@ def add_terms(
         agreement = nx * mx + ny * my
         counts = blocks[at + np.uint64(NEAR)]
         counts = counts if ex * ex + ey * ey <= squared_distance else 0.0
-        counts = counts if agreement >= -LEAST_AGREEMENT else 0.0
+        lineless = lx == 0.0 and ly == 0.0
+        counts = counts if lineless or agreement >= agreement_least else 0.0
         sums[USED + to] += counts
         residual = nx * x + ny * y - blocks[at + np.uint64(OFFSET)]
         across = nx * rx + ny * ry

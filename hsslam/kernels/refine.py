@@ -8,9 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.blocks import LANES, TERMS, add_terms, blocks_of, find_segments, take_variances
+from hsslam.kernels.blocks import (
+    LANES,
+    LEAST_AGREEMENT,
+    TERMS,
+    add_terms,
+    blocks_of,
+    find_segments,
+    take_variances,
+)
 from hsslam.kernels.variances import GRAZING, variances_of
 from hsslam.se2 import Points, Pose, wrap
+
+NOISY = 0.1
+"""Returns are noisy where the least squared cosine is under this. Beside an edge the segment nearest to them may be of
+another surface: they count only if their line agrees with it. A door post drew robots back by 2 cm in the doorway."""
 
 NO_LINES: NDArray[np.float64] = np.empty((0, 3))
 """Point-to-line only."""
@@ -33,8 +45,8 @@ def refine(
 
     Where the scan's own lines are given, the place on the segment nearest to a point is also to lie on the line
     through the scan at that point: the noise of either scan then counts in one of the two distances only, and the
-    lines of neither are taken for the truth. And a point whose line runs the other way is left out: it is of the
-    other side of a wall, which robots in neighbouring rooms see 10 to 20 cm apart.
+    lines of neither are taken for the truth. And a point whose line runs the other way is left out, unless a segment
+    of its own side is near: it is of the other side of a wall, which two rooms show 10 to 20 cm apart.
 
     A range errs along its beam, from the origin of the points' frame, so the part of its variance that is across the
     line is the squared cosine between beam and normal: points count by its inverse, as far as walls are even. And
@@ -91,7 +103,20 @@ def refine(
         sums[:] = 0.0
         for block in range(2 * half if settled else half):
             find_segments(pieces, nearest, frame, x0, y0, c, s, block, blocks, known)
-            add_terms(x0, y0, c, s, distance**2, squared_scale, least, settled and both, block, blocks, sums)
+            add_terms(
+                x0,
+                y0,
+                c,
+                s,
+                distance**2,
+                squared_scale,
+                least,
+                LEAST_AGREEMENT if least < NOISY else -LEAST_AGREEMENT,
+                settled and both,
+                block,
+                blocks,
+                sums,
+            )
         for term in range(TERMS):
             totals[term] = sums[term * LANES : (term + 1) * LANES].sum()
         xx, xy, xt, yy, yt, tt, gx, gy, gt, used = totals
