@@ -143,3 +143,58 @@ def test_stamps_that_repeat_do_no_harm() -> None:
     result = Slam(Config()).solve(scans)
     assert len(result.trajectory) == 60
     assert largest_error(result.trajectory.poses, office.poses) < 0.10
+
+
+def test_a_robot_of_which_nothing_tells_may_go_on_all_the_way() -> None:
+    """Odometry stands still all at once, and scans see nothing: that was a robot at rest, sure to centimetres."""
+    model, step = MotionModel(RULES), pose(0.2, 0.0, 0.05)
+    model.start(scan(0.0, np.zeros(3)))
+    place = np.zeros(3)
+    for i in range(1, 6):
+        place = compose(place, step)
+        model.observe(scan(0.5 * i, place), step, matched=True)
+    variances = np.zeros(3)
+    for i in range(6, 16):
+        moved, covariance = model.predict(scan(0.5 * i, place))
+        assert moved == pytest.approx(np.zeros(3))
+        variances += np.diag(covariance)
+        assert model.lost is (i - 6 > 5)
+        model.observe(scan(0.5 * i, place), moved, matched=False)
+    assert np.sqrt(variances) == pytest.approx([2.0, 2.0, 0.5], rel=0.02)
+    assert model.pause(scan(8.0, place)) == pytest.approx(5.5)
+    model.observe(scan(8.0, place), np.zeros(3), matched=True)
+    assert not model.lost
+    assert model.predict(scan(8.5, place))[1][0, 0] < 0.01
+
+
+def test_a_robot_that_stood_still_before_stays() -> None:
+    model = MotionModel(RULES)
+    model.start(scan(0.0, np.zeros(3)))
+    for i in range(1, 100):
+        _, covariance = model.predict(scan(0.5 * i, np.zeros(3)))
+        model.observe(scan(0.5 * i, np.zeros(3)), np.zeros(3), matched=i < 3)
+    assert covariance[0, 0] < 1e-4
+    assert not model.lost
+
+
+@pytest.mark.parametrize("far", [False, True])
+def test_who_got_lost_is_looked_for_everywhere(far: bool) -> None:
+    """The office's corridor: odometry fails at a third of it, the laser sees nothing for a while, then all is well."""
+    office = SimulatedDataset("office", seed=4, scans=1000)
+    scans, gone = list(office.scans()), 700
+    back = gone + (40 if far else 0)
+    before, failed = scans[:gone], scans[gone : gone + 12]
+    stands = before[-1].odometry
+    blind = [replace(s, odometry=stands, ranges=np.full_like(s.ranges, np.inf)) for s in failed]
+    after = []
+    for k, s in enumerate(scans[back + 12 if far else gone - 1 :][:200]):
+        index = gone + 12 + k
+        relative = between_many(office.odometry[[back + 12 if far else gone - 1]], s.odometry[None])[0]
+        after.append(replace(s, odometry=compose(stands, relative), index=index, stamp=0.25 * index))
+    log = [replace(s, index=i, stamp=0.25 * i) for i, s in enumerate([*before, *blind, *after])]
+    result = Slam(Config()).solve(log)
+    assert result.statistics["paused_before"] == ([gone + 12] if far else [])
+    assert result.statistics["sessions"] == 1
+    kept = [*range(gone), *range(gone + 12, len(log))]
+    truth = office.poses[[*range(gone), *(s.index for s in scans[back + 12 if far else gone - 1 :][:200])]]
+    assert largest_error(result.trajectory.poses[kept], truth) < 0.1

@@ -120,9 +120,9 @@ class SlamResult:
     statistics : dict
         ``evaluations`` of all matches in tracking and loops; ``guessed``, of how many scans neither a match nor
         odometry told the pose; ``first_guessed``, the first of them, or None; ``paused_before``, scans that do not fit
-        where the robot was before the recording paused; ``sessions``, how many parts of the log, between such
-        pauses, are not tied to one another at the end; ``own_parts_deg``, how much of the laser's view parts of the
-        robot hide (deg).
+        where the robot was before the recording paused or it got lost; ``sessions``, how many parts of the log,
+        between such pauses, are not tied to one another at the end; ``own_parts_deg``, how much of the laser's view
+        parts of the robot hide (deg).
     seconds : dict
         Wall time by stage (s), such as ``track``, ``submap``, ``loops``, ``graph``, ``final``, ``rescan``.
     covariances : float64 (K, 3, 3), optional

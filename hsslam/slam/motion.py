@@ -24,6 +24,9 @@ LEAP = 0.2
 UNSTEADY = 0.3
 """Share of the change of odometry's motion, from one scan to the next, that may be its error (standard deviation)."""
 
+LOST = 1.0
+"""The robot is lost where it may have gone this far (m) since something last told of its motion."""
+
 FADING = 0.8
 """Share of a motion that is left a scan later where neither odometry nor a match tells of it."""
 
@@ -60,6 +63,9 @@ class MotionModel:
         self._middle: Pose = np.zeros(3)
         self._clock = ScanClock()
         self._silent = 0
+        self._told: Pose = np.zeros(3)
+        self._told_at = 0.0
+        self._untold = 0
 
     @property
     def last_motion(self) -> Pose:
@@ -70,6 +76,11 @@ class MotionModel:
     def silent(self) -> bool:
         """Whether odometry has stopped telling of motion."""
         return self._silent >= SILENT_AFTER
+
+    @property
+    def lost(self) -> bool:
+        """Whether the robot may have gone far while neither odometry nor a match told of its motion."""
+        return self._untold * math.hypot(self._told[0], self._told[1]) > LOST
 
     def still(self, scan: LaserScan) -> bool:
         """Whether odometry says the same of a scan as of the last."""
@@ -85,8 +96,8 @@ class MotionModel:
         return self._clock.paused(scan.stamp)
 
     def pause(self, scan: LaserScan) -> float:
-        """How long the recording paused before a scan (s): infinite if stamps go back."""
-        return self._clock.pause(scan.stamp)
+        """How long the recording paused before a scan, or nothing told of motion (s): infinite if stamps go back."""
+        return max(self._clock.pause(scan.stamp), scan.stamp - self._told_at if self._untold else 0.0)
 
     def surely_paused(self, scan: LaserScan) -> bool:
         """Whether the recording paused before a scan, and no stamp was late for long."""
@@ -107,7 +118,8 @@ class MotionModel:
         """Motion since the last scan, in its frame, and the motion's covariance (3, 3)."""
         if not self.silent:
             moved = between(self._odometry, scan.odometry)
-            return moved, self.covariance(moved) + self._unsteady(moved)
+            noise = self.covariance(moved) + self._unsteady(moved)
+            return moved, noise + self._may_go_on() if self.still(scan) else noise
         moved = self._last_motion * self._stretch(scan.stamp)
         return moved, self.covariance(moved) + np.diag([0.05**2, 0.05**2, math.radians(3.0) ** 2])
 
@@ -140,6 +152,10 @@ class MotionModel:
         self._middle = middle
         if self.silent and self.still(scan) and not matched:
             motion = FADING * motion
+        if self.still(scan) and not (matched or self.silent):
+            self._untold += 1
+        else:
+            self._told, self._told_at, self._untold = motion, scan.stamp, 0
         if not self.still(scan):
             self._silent = 0
         elif math.hypot(motion[0], motion[1]) + abs(motion[2]) > MOVING:
@@ -164,6 +180,18 @@ class MotionModel:
         change = moved - self._last_step
         xy = (UNSTEADY * math.hypot(change[0], change[1])) ** 2
         return np.diag([xy, xy, (UNSTEADY * wrap(change[2])) ** 2])
+
+    def _may_go_on(self) -> NDArray[np.float64]:
+        """What it adds to a motion's covariance (3, 3) that nothing tells of it, nor of those before.
+
+        The robot may stand, as odometry says, or go on as it went when something last told: all the way.
+        """
+        before = self._untold
+        if not before:
+            return np.zeros((3, 3))
+        growth = (before + 1) ** 2 - (before**2 if before > 1 else 0)
+        xy, theta = self._told[0] ** 2 + self._told[1] ** 2, self._told[2] ** 2
+        return growth * np.diag([xy, xy, theta])
 
     def _stretch(self, stamp: float) -> float:
         """Time since the last scan over the time before it; 1 where stamps are no help."""

@@ -29,6 +29,9 @@ SOONER = 1.0 / 3.0
 LEAST_RETURNS = 10
 """Returns that a match must explain to be believed: fewer fit in many a place."""
 
+RETURNS_OF_THE_LOST = 30
+"""So many where the robot may be anywhere around, not near odometry's prediction alone."""
+
 LEAST_EXTENT = 1.0
 """Returns within a box of this diagonal (m) do not contradict odometry: a piece of one surface looks like any other."""
 
@@ -114,8 +117,9 @@ class Tracker:
         tracked = known if known is not None else self._match(scan, points, predicted, prior)
         newest = self._submap.newest
         unfit = not tracked.matched or tracked.score < self.usual_score - UNFIT
+        found_again = self._motion.lost and len(points) >= RETURNS_OF_THE_LOST
         self.pause = None
-        if unfit and self._motion.paused(scan):
+        if unfit and (self._motion.paused(scan) or found_again):
             noise = ANYWHERE
             tracked = replace(tracked, relative=between(newest, predicted), covariance=noise, matched=False)
             self.pause = Pause(tracked.relative, self._motion.pause(scan))
@@ -200,7 +204,8 @@ class Tracker:
             expected
         )
         explained = result.score * len(points)
-        matched = result.converged and result.score >= rules.min_score and explained >= LEAST_RETURNS
+        least = RETURNS_OF_THE_LOST if self._motion.lost else LEAST_RETURNS
+        matched = result.converged and result.score >= rules.min_score and explained >= least
         if matched and expected.contradicts(result):
             matched = float(np.hypot(*np.ptp(points, axis=0))) >= LEAST_EXTENT
         if not matched:
