@@ -167,6 +167,19 @@ def test_a_robot_of_which_nothing_tells_may_go_on_all_the_way() -> None:
     assert model.predict(scan(8.5, place))[1][0, 0] < 0.01
 
 
+def test_a_robot_that_came_to_rest_stays_though_a_crowd_hides_the_walls() -> None:
+    model, place = MotionModel(RULES), np.zeros(3)
+    model.start(scan(0.0, place))
+    for i, step in enumerate((0.1, 0.1, 0.1, 0.06, 0.02), start=1):
+        place = compose(place, pose(step, 0.0, 0.0))
+        model.observe(scan(0.2 * i, place), pose(step, 0.0, 0.0), matched=i < 4)
+    for i in range(6, 300):
+        _, covariance = model.predict(scan(0.2 * i, place))
+        model.observe(scan(0.2 * i, place), np.zeros(3), matched=False)
+    assert covariance[0, 0] < 1e-4
+    assert not model.lost
+
+
 def test_a_robot_that_stood_still_before_stays() -> None:
     model = MotionModel(RULES)
     model.start(scan(0.0, np.zeros(3)))

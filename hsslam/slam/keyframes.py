@@ -22,7 +22,7 @@ class Keyframes:
     Parameters
     ----------
     scans : sequence of LaserScan
-        As recorded, in order.
+        Theirs, in order, without what the laser saw of the robot itself.
     points : sequence of Points
         (N_i, 2) m of each, in its own frame: returns of what stays where it is, in the order of the beams.
     poses : Poses

@@ -24,6 +24,9 @@ LEAP = 0.2
 UNSTEADY = 0.3
 """Share of the change of odometry's motion, from one scan to the next, that may be its error (standard deviation)."""
 
+AT_SPEED = 0.15
+"""A robot slower than this (m/s) may come to rest from one scan to the next; of a faster one odometry tells how it brakes."""
+
 LOST = 1.0
 """The robot is lost where it may have gone this far (m) since something last told of its motion."""
 
@@ -155,7 +158,9 @@ class MotionModel:
         if self.still(scan) and not (matched or self.silent):
             self._untold += 1
         else:
-            self._told, self._told_at, self._untold = motion, scan.stamp, 0
+            at_speed = math.hypot(motion[0], motion[1]) > AT_SPEED * self._clock.since_last(scan.stamp) > 0.0
+            self._told = motion if at_speed else np.zeros(3)
+            self._told_at, self._untold = scan.stamp, 0
         if not self.still(scan):
             self._silent = 0
         elif math.hypot(motion[0], motion[1]) + abs(motion[2]) > MOVING:
@@ -184,7 +189,7 @@ class MotionModel:
     def _may_go_on(self) -> NDArray[np.float64]:
         """What it adds to a motion's covariance (3, 3) that nothing tells of it, nor of those before.
 
-        The robot may stand, as odometry says, or go on as it went when something last told: all the way.
+        The robot may stand, as odometry says, or go on as it went at speed when something last told: all the way.
         """
         before = self._untold
         if not before:
