@@ -25,7 +25,7 @@ UNSTEADY = 0.3
 """Share of the change of odometry's motion, from one scan to the next, that may be its error (standard deviation)."""
 
 AT_SPEED = 0.15
-"""A robot slower than this (m/s) may come to rest from one scan to the next; of a faster one odometry tells how it brakes."""
+"""A robot slower than this (m/s) may come to rest from one scan to the next; odometry tells how a faster one brakes."""
 
 LOST = 1.0
 """The robot is lost where it may have gone this far (m) since something last told of its motion."""
