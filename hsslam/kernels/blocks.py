@@ -117,6 +117,7 @@ def find_segments(
     y0: float,
     c: float,
     s: float,
+    noisy: bool,
     block: int,
     blocks: NDArray[np.float64],
     known: NDArray[np.int64],
@@ -129,6 +130,8 @@ def find_segments(
         Of a `Surface`.
     x0, y0, c, s : float
         Pose of the points' frame: its position, cosine and sine of its angle.
+    noisy : bool
+        Whether noise may carry a return through a wall: see `ASIDE`.
     block : int
         Number of the block.
     blocks, known : arrays
@@ -151,7 +154,7 @@ def find_segments(
         if k == known[slot]:
             continue
         known[slot] = k
-        if k >= 0:
+        if noisy and k >= 0:
             lx, ly = blocks[at + np.uint64(LINE_X)], blocks[at + np.uint64(LINE_Y)]
             mx, my = c * lx - s * ly, s * lx + c * ly
             if pieces[np.uint64(k), 5] * mx + pieces[np.uint64(k), 6] * my < -LEAST_AGREEMENT:
@@ -160,8 +163,9 @@ def find_segments(
                 u, v = u + ASIDE * mx * frame[2], v + ASIDE * my * frame[2]
                 if u >= 0.0 and v >= 0.0 and u < width and v < height:
                     key = nearest[np.uint64(v), np.uint64(u)]
-                    if key != EMPTY:
-                        k = int(key) & number
+                    other = np.uint64(int(key) & number)
+                    if key != EMPTY and pieces[other, 5] * mx + pieces[other, 6] * my >= LEAST_AGREEMENT:
+                        k = int(other)
         blocks[at + np.uint64(NEAR)] = 1.0 if k >= 0 else 0.0
         if k >= 0:
             for value in range(8):

@@ -20,7 +20,7 @@ from hsslam.kernels.blocks import (
 from hsslam.kernels.variances import GRAZING, variances_of
 from hsslam.se2 import Points, Pose, wrap
 
-NOISY = 0.1
+NOISY = 0.051
 """Returns are noisy where the least squared cosine is under this. Beside an edge the segment nearest to them may be of
 another surface: they count only if their line agrees with it. A door post drew robots back by 2 cm in the doorway."""
 
@@ -86,7 +86,7 @@ def refine(
     sums, totals = np.empty(TERMS * LANES), np.empty(TERMS)
     half, blocks, known = blocks_of(points, lines)
     both = lines.shape[0] > 0
-    told = False
+    told = noisy = False
     least = GRAZING
     variances = np.ones(points.shape[0])
     for iteration in range(iterations):
@@ -97,12 +97,12 @@ def refine(
         if settled and not told:
             least = variances_of(pieces, nearest, frame, points, pose, distance, variances)
             take_variances(variances, half, blocks)
-            told = True
+            told, noisy = True, least < NOISY
         c, s = math.cos(pose[2]), math.sin(pose[2])
         x0, y0 = pose[0], pose[1]
         sums[:] = 0.0
         for block in range(2 * half if settled else half):
-            find_segments(pieces, nearest, frame, x0, y0, c, s, block, blocks, known)
+            find_segments(pieces, nearest, frame, x0, y0, c, s, noisy, block, blocks, known)
             add_terms(
                 x0,
                 y0,
@@ -111,7 +111,7 @@ def refine(
                 distance**2,
                 squared_scale,
                 least,
-                LEAST_AGREEMENT if least < NOISY else -LEAST_AGREEMENT,
+                LEAST_AGREEMENT if noisy else -LEAST_AGREEMENT,
                 settled and both,
                 block,
                 blocks,
