@@ -195,7 +195,7 @@ def test_who_got_lost_is_looked_for_everywhere(far: bool) -> None:
     """The office's corridor: odometry fails at a third of it, the laser sees nothing for a while, then all is well."""
     office = SimulatedDataset("office", seed=4, scans=1000)
     scans, gone = list(office.scans()), 700
-    back = gone + (40 if far else 0)
+    back = gone + (80 if far else 0)
     before, failed = scans[:gone], scans[gone : gone + 12]
     stands = before[-1].odometry
     blind = [replace(s, odometry=stands, ranges=np.full_like(s.ranges, np.inf)) for s in failed]
