@@ -51,7 +51,6 @@ def sums(
     noisy: bool = False,
 ) -> NDArray[np.float64]:
     """By the kernels, all blocks."""
-    agreement = LEAST_AGREEMENT if noisy else -LEAST_AGREEMENT
     half, blocks, known = blocks_of(points, lines)
     take_variances(variances, half, blocks)
     out = np.zeros(TERMS * LANES)
@@ -60,7 +59,7 @@ def sums(
         find_segments(
             surface.pieces, surface.nearest, surface.frame, x0, y0, c, s, noisy, block, blocks, known
         )
-        add_terms(x0, y0, c, s, DISTANCE**2, SCALE**2, LEAST, agreement, len(lines) > 0, block, blocks, out)
+        add_terms(x0, y0, c, s, DISTANCE**2, SCALE**2, LEAST, noisy, len(lines) > 0, block, blocks, out)
     total: NDArray[np.float64] = out.reshape(TERMS, LANES).sum(axis=1)
     return total
 

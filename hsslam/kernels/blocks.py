@@ -181,7 +181,7 @@ def add_terms(
     squared_distance: float,
     squared_scale: float,
     least: float,
-    agreement_least: float,
+    noisy: bool,
     both: bool,
     block: int,
     blocks: NDArray[np.float64],
@@ -199,8 +199,8 @@ def add_terms(
         Of the Cauchy weight (m^2).
     least : float
         The least squared cosine between beam and normal, see `hsslam.kernels.variances`.
-    agreement_least : float
-        Cosine of the angle between a point's line, if it has one, and its segment's, at least.
+    noisy : bool
+        Whether a point counts only if its line, where it has one, agrees with its segment's; else it must not deny it.
     both : bool
         Whether the places on the segments are to lie on the scan's lines, too.
     block : int
@@ -211,6 +211,7 @@ def add_terms(
         Takes the terms.
     """
     begin = block * BLOCK
+    agreement_least = LEAST_AGREEMENT if noisy else -LEAST_AGREEMENT
     for lane in range(LANES):
         to = np.uint64(lane)
         at = np.uint64(begin) + to

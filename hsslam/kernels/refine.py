@@ -8,15 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.blocks import (
-    LANES,
-    LEAST_AGREEMENT,
-    TERMS,
-    add_terms,
-    blocks_of,
-    find_segments,
-    take_variances,
-)
+from hsslam.kernels.blocks import LANES, TERMS, add_terms, blocks_of, find_segments, take_variances
 from hsslam.kernels.variances import GRAZING, variances_of
 from hsslam.se2 import Points, Pose, wrap
 
@@ -104,18 +96,7 @@ def refine(
         for block in range(2 * half if settled else half):
             find_segments(pieces, nearest, frame, x0, y0, c, s, noisy, block, blocks, known)
             add_terms(
-                x0,
-                y0,
-                c,
-                s,
-                distance**2,
-                squared_scale,
-                least,
-                LEAST_AGREEMENT if noisy else -LEAST_AGREEMENT,
-                settled and both,
-                block,
-                blocks,
-                sums,
+                x0, y0, c, s, distance**2, squared_scale, least, noisy, settled and both, block, blocks, sums
             )
         for term in range(TERMS):
             totals[term] = sums[term * LANES : (term + 1) * LANES].sum()

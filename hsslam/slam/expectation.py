@@ -17,14 +17,14 @@ from hsslam.slam.windows import difference, foreseen_window
 USUAL = 0.05
 """A scan fits as usual if its score is no further than this below those of the last scans."""
 
+UNLIKE = 0.1
+"""Odometry's motion is unlike the last one where it leads this far (m + rad) from where that leads."""
+
 RECOVERY_GAIN = 0.12
 """Odometry is overruled only by an answer whose score is this much higher: people who walk along see no motion."""
 
 LEAP_GAIN = 0.06
 """By this much, where odometry leaps and the answer goes on as the robot went."""
-
-UNLIKE = 0.1
-"""Odometry's motion is unlike the last one where it leads this far (m + rad) from where that leads."""
 
 IMPOSSIBLE = 1.0
 """By none at all, where odometry leaps further than this (m + rad) from where the robot was going."""
