@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.blocks import LANES, TERMS, add_terms, blocks_of, find_segments, take_variances
+from hsslam.kernels.blocks import AGAIN, LANES, TERMS, add_terms, blocks_of, find_segments, take_variances
 from hsslam.kernels.variances import GRAZING, variances_of
 from hsslam.se2 import Points, Pose, wrap
 
@@ -90,6 +90,8 @@ def refine(
             least = variances_of(pieces, nearest, frame, points, pose, distance, variances)
             take_variances(variances, half, blocks)
             told, noisy = True, least < NOISY
+            if noisy:
+                known[:] = AGAIN
         c, s = math.cos(pose[2]), math.sin(pose[2])
         x0, y0 = pose[0], pose[1]
         sums[:] = 0.0
