@@ -1,8 +1,8 @@
 """The journal of a run: every event as a line of JSON, from which a killed run goes on where it was.
 
-Its first line is a header that says what is being run; a run goes on only as the very same one. Floats are
-written with `repr`, so that they come back bit by bit, and every line is handed to the system at once: what
-was written before a kill is there after it.
+Its first line is a header that says what is being run; a run goes on only as the very same one. Floats have as many
+digits as it takes for them to come back bit by bit, and every line is handed to the system at once: what was written
+before a kill is there after it.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
+import orjson
 
 from hsslam.errors import ConfigError, DataError
 from hsslam.slam.events import Event, KeyframeAdded, LoopChecked, Optimised, Tracked
@@ -127,21 +128,21 @@ class Journal:
         self._replay = replay if replay is not None else Replay()
         if replay is None:
             try:
-                self._file = path.open("x", encoding="utf-8")
+                self._file = path.open("xb")
             except FileExistsError as error:
                 raise DataError(f"{path}: holds a run already; resume it or choose another folder") from error
-            self._line({"journal": _FORMAT, **asdict(header)})
+            self._write(_json({"journal": _FORMAT, **asdict(header)}))
             return
         if replay.header is not None:
             header.check_same(replay.header, path)
         os.truncate(path, replay.end)
-        self._file = path.open("a", encoding="utf-8")
+        self._file = path.open("ab")
 
     def write(self, event: Event) -> None:
         """Append an event."""
         if not self._replay.holds(event):
             name, attributes = _NAMES[type(event)]
-            self._line({"event": name, **{key: getattr(event, key) for key in attributes}})
+            self._write(_line({"event": name, **{key: getattr(event, key) for key in attributes}}))
 
     def close(self) -> None:
         """Close the file."""
@@ -155,8 +156,8 @@ class Journal:
     ) -> None:
         self.close()
 
-    def _line(self, values: Mapping[str, Any]) -> None:
-        self._file.write(_ENCODER.encode(values) + "\n")
+    def _write(self, line: bytes) -> None:
+        self._file.write(line)
         self._file.flush()
 
 
@@ -235,10 +236,18 @@ def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
+def _line(values: Mapping[str, Any]) -> bytes:
+    """A line of JSON; written in a tenth of the time that `json` takes, of which a run writes one for every scan."""
+    line = orjson.dumps(values, _plain, orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE)
+    # It says null of a number that is none, or infinite; `json` has words for these.
+    return _json(values) if b"null" in line else line
+
+
+def _json(values: Mapping[str, Any]) -> bytes:
+    return json.dumps(values, default=_plain).encode() + b"\n"
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} has no place in a journal")
-
-
-_ENCODER = json.JSONEncoder(default=_plain)

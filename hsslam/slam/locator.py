@@ -130,6 +130,8 @@ class Locator:
             found = self._left_open(expected, found)
         if expected.told and found.score < expected.score - UNFIT and expected.contradicts(found):
             found = _unsure(found, expected)
+        if found.evaluations == self._evaluations:
+            return found
         return replace(found, evaluations=self._evaluations)
 
     def _match(self, guess: Pose, window: SearchWindow) -> MatchResult:

@@ -40,8 +40,23 @@ REST_STD_THETA = math.radians(0.05)
 
 def way(start: Pose, end: Pose) -> float:
     """Way from a pose to another (m + rad)."""
-    x, y, theta = end - start
+    x, y, theta = (end - start).tolist()
     return math.hypot(x, y) + abs(wrap(theta))
+
+
+def _length(motion: Pose) -> float:
+    """Length of a motion (m + rad)."""
+    x, y, theta = motion.tolist()
+    length: float = math.hypot(x, y) + abs(theta)
+    return length
+
+
+def _diagonal(xy: float, theta: float) -> NDArray[np.float64]:
+    """Covariance (3, 3) of a position known as well in all directions (m^2), and of a heading (rad^2)."""
+    out = np.zeros((3, 3))
+    out[0, 0] = out[1, 1] = xy
+    out[2, 2] = theta
+    return out
 
 
 class MotionModel:
@@ -108,9 +123,7 @@ class MotionModel:
 
     def _held(self, scan: LaserScan) -> bool:
         """Whether odometry says the same as for the last scan, or said so then, although the robot moved."""
-        return way(np.zeros(3), self._last_motion) > MOVING and (
-            self.still(scan) or not self._last_step.any()
-        )
+        return _length(self._last_motion) > MOVING and (self.still(scan) or not self._last_step.any())
 
     def start(self, scan: LaserScan) -> None:
         """Begin with the first scan."""
@@ -121,10 +134,13 @@ class MotionModel:
         """Motion since the last scan, in its frame, and the motion's covariance (3, 3)."""
         if not self.silent:
             moved = between(self._odometry, scan.odometry)
-            noise = self.covariance(moved) + self._unsteady(moved)
+            xy, theta = self._variances(moved)
+            unsteady_xy, unsteady_theta = self._unsteady(moved)
+            noise = _diagonal(xy + unsteady_xy, theta + unsteady_theta)
             return moved, noise + self._may_go_on() if self.still(scan) else noise
         moved = self._last_motion * self._stretch(scan.stamp)
-        return moved, self.covariance(moved) + np.diag([0.05**2, 0.05**2, math.radians(3.0) ** 2])
+        xy, theta = self._variances(moved)
+        return moved, _diagonal(xy + 0.05**2, theta + math.radians(3.0) ** 2)
 
     def velocity(self, scan: LaserScan) -> Pose:
         """Velocity (m/s, m/s, rad/s) from the last scan to this, in the robot's frame; 0 where stamps do not tell.
@@ -153,38 +169,40 @@ class MotionModel:
         middle = scan.middle
         motion = between(self._middle, compose(motion, middle))
         self._middle = middle
-        if self.silent and self.still(scan) and not matched:
+        still, seconds = self.still(scan), self._clock.since_last(scan.stamp)
+        if self.silent and still and not matched:
             motion = FADING * motion
-        if self.still(scan) and not (matched or self.silent):
+        if still and not (matched or self.silent):
             self._untold += 1
         else:
-            at_speed = math.hypot(motion[0], motion[1]) > AT_SPEED * self._clock.since_last(scan.stamp) > 0.0
+            x, y, _ = motion.tolist()
+            at_speed = math.hypot(x, y) > AT_SPEED * seconds > 0.0
             self._told = motion if at_speed else np.zeros(3)
             self._told_at, self._untold = scan.stamp, 0
-        if not self.still(scan):
+        if not still:
             self._silent = 0
-        elif math.hypot(motion[0], motion[1]) + abs(motion[2]) > MOVING:
+        elif _length(motion) > MOVING:
             self._silent += 1
         self._last_step = between(self._odometry, scan.odometry)
-        self._last_motion, self._last_seconds = motion, self._clock.since_last(scan.stamp)
+        self._last_motion, self._last_seconds = motion, seconds
         self._odometry = scan.odometry
         self._clock.observe(scan.stamp)
 
     def covariance(self, moved: Pose) -> NDArray[np.float64]:
         """Covariance (3, 3) of an odometry motion."""
-        travel = math.hypot(moved[0], moved[1]) + abs(moved[2])
+        return _diagonal(*self._variances(moved))
+
+    def _variances(self, moved: Pose) -> tuple[float, float]:
+        """Variances of an odometry motion's position (m^2) and heading (rad^2)."""
+        travel = _length(moved)
         xy = (self._config.odometry_std_xy * travel) ** 2 + REST_STD_XY**2
         theta = (math.radians(self._config.odometry_std_theta_deg) * travel) ** 2 + REST_STD_THETA**2
-        out = np.zeros((3, 3))
-        out[0, 0] = out[1, 1] = xy
-        out[2, 2] = theta
-        return out
+        return xy, theta
 
-    def _unsteady(self, moved: Pose) -> NDArray[np.float64]:
-        """What a motion unlike the last adds to its covariance (3, 3): messages come late, and wheels slip."""
-        change = moved - self._last_step
-        xy = (UNSTEADY * math.hypot(change[0], change[1])) ** 2
-        return np.diag([xy, xy, (UNSTEADY * wrap(change[2])) ** 2])
+    def _unsteady(self, moved: Pose) -> tuple[float, float]:
+        """What a motion unlike the last adds to these variances: messages come late, and wheels slip."""
+        x, y, theta = (moved - self._last_step).tolist()
+        return (UNSTEADY * math.hypot(x, y)) ** 2, (UNSTEADY * wrap(theta)) ** 2
 
     def _may_go_on(self) -> NDArray[np.float64]:
         """What it adds to a motion's covariance (3, 3) that nothing tells of it, nor of those before.

@@ -24,11 +24,12 @@ class OwnParts:
     def __init__(self) -> None:
         self._seen: NDArray[np.float64] = np.zeros((BINS, 8))
         self._heading = 0.0
+        self._any = False
         self.ranges: NDArray[np.float64] = np.full(BINS, np.nan)
         """How far from the laser a part is in each direction (m), (BINS,); NaN where there is none."""
 
     def __bool__(self) -> bool:
-        return not bool(np.isnan(self.ranges).all())
+        return self._any
 
     @property
     def degrees(self) -> float:
@@ -43,7 +44,7 @@ class OwnParts:
         found = ranges_of_parts(self._seen)
         there = ~np.isnan(found)
         new = there & ~(np.abs(found - self.ranges) < SLACK)
-        self.ranges = np.where(there & ~new, self.ranges, found)
+        self.ranges, self._any = np.where(there & ~new, self.ranges, found), bool(there.any())
         return bool(new.any())
 
     def without(self, scan: LaserScan) -> LaserScan:

@@ -141,7 +141,7 @@ class Tracker:
         """Whether the scan is far enough from the newest keyframe to become one, or sees what the submap lacks."""
         if self.pause is not None:
             return True
-        x, y, theta = tracked.relative
+        x, y, theta = tracked.relative.tolist()
         rules = self._config.keyframes
         share = 1.0 if tracked.score >= rules.min_score else SOONER
         far = math.hypot(x, y) >= share * rules.distance

@@ -91,12 +91,13 @@ def difference(pose: Pose, other: Pose) -> Pose:
 
 def at_edge(off: Pose, window: SearchWindow) -> bool:
     """Whether an answer that is ``off`` the middle of a window is at its edge."""
-    x, y, theta = map(float, off)
-    return (
+    x, y, theta = off.tolist()
+    beyond: bool = (
         abs(x) > EDGE * window.half_x
         or abs(y) > EDGE * window.half_y
         or abs(theta) > EDGE * window.half_theta
     )
+    return beyond
 
 
 def differences(poses: Poses, others: Poses) -> Poses:
