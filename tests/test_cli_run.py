@@ -209,9 +209,9 @@ def test_two_logs_in_a_row_are_two_sessions_of_one_map(tmp_path: Path) -> None:
     both.write_bytes(b"".join((tmp_path / f"{name}.clf").read_bytes() for name in ("monday", "tuesday")))
     result = hsslam("run", both, "--out", tmp_path / "both")
     assert result.exit_code == 0, result.output
-    (line,) = [line for line in result.output.splitlines() if line.startswith("pauses")]
-    assert line.split("pauses", 1)[1].strip() == (
-        "after 1 the robot was elsewhere (scan 500); it was found again after each"
+    (line,) = [line for line in result.output.splitlines() if line.startswith("sessions")]
+    assert line.split("sessions", 1)[1].strip() == (
+        "1 begun by a pause or by getting lost, the robot being elsewhere (scan 500); it was found again in each"
     )
     told = json.loads((tmp_path / "both" / "metrics.json").read_text())["statistics"]
     assert (told["paused_before"], told["sessions"]) == ([500], 1)

@@ -82,7 +82,7 @@ def summary(
         ("dataset", f"{log.info.name}: {metrics['scans']:,} scans, {duration:,.0f} s of driving"),
         ("matcher", f"{metrics['matcher']}: {metrics['matched']:,} of {metrics['scans']:,} scans matched"),
         *([("lost", lost)] if (lost := _lost(metrics)) else []),
-        *([("pauses", pauses)] if (pauses := _pauses(metrics)) else []),
+        *([("sessions", sessions)] if (sessions := _sessions(metrics)) else []),
         *([("own parts", own)] if (own := _own_parts(metrics)) else []),
         ("wall time", _wall_time(timings)),
         ("keyframes", f"{metrics['keyframes']:,}"),
@@ -114,16 +114,16 @@ def _lost(metrics: dict[str, Any]) -> str:
     )
 
 
-def _pauses(metrics: dict[str, Any]) -> str:
-    """What is to be said of a log that the robot did not record in one go; nothing where it did."""
+def _sessions(metrics: dict[str, Any]) -> str:
+    """What is to be said of a log in which the robot was elsewhere all at once; nothing where it was not."""
     told = metrics["statistics"]
     scans, sessions = told["paused_before"], told["sessions"]
     if not scans:
         return ""
     first = ", ".join(f"{scan:,}" for scan in scans[:3]) + (", ..." if len(scans) > 3 else "")
-    where = f"after {len(scans)} the robot was elsewhere (scan {first}); "
+    where = f"{len(scans)} begun by a pause or by getting lost, the robot being elsewhere (scan {first}); "
     if sessions == 1:
-        return where + "it was found again after each"
+        return where + "it was found again in each"
     return where + f"{sessions} parts of the log could not be tied together: how they lie is odometry's guess"
 
 
