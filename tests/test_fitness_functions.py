@@ -38,7 +38,7 @@ def heavy_tails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_plugins_fitness_function_conforms_in_every_search(heavy_tails: None) -> None:
-    assert fitness_names() == ["paper", "surface", "likelihood", "heavy_tails"]
+    assert fitness_names() == ["paper", "surface", "sides", "likelihood", "heavy_tails"]
     assert "heavy_tails" in HideConfig.model_json_schema()["properties"]["fitness"]["enum"]
     check_matcher(create("hide", {"fitness": "heavy_tails"}))
 

@@ -9,15 +9,17 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hsslam.kernels.assess import assess, degenerate_direction
-from hsslam.kernels.fitness import count_hits, interpolate_points, scratch
-from hsslam.kernels.raster import Raster
+from hsslam.kernels.fitness import count_hits, count_sided, interpolate_points, scratch
+from hsslam.kernels.raster import Raster, stamp_squares
 from hsslam.kernels.surface import Surface
 from hsslam.search import HitFitness
+from hsslam.search.polish import scan_lines
 
 coordinates = st.floats(-4.0, 4.0, allow_nan=False)
 clouds = st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=200).map(
     lambda rows: np.array(rows, dtype=np.float64)
 )
+walks = clouds.map(lambda steps: np.cumsum(0.04 * steps, axis=0))
 poses = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-4.0, 4.0)).map(np.array)
 
 
@@ -211,7 +213,7 @@ def test_interpolated_worth_agrees_with_numpy(points: NDArray[np.float64], pose:
         raster.cells.ravel(),
         raster.cells.shape,
         raster.frame,
-        *fitness.scaled,
+        *fitness.scaled[:2],
         fitness.count,
         *near,
         0,
@@ -227,6 +229,67 @@ def test_interpolated_worth_agrees_with_numpy(points: NDArray[np.float64], pose:
     assert found == pytest.approx((low * (1 - q) + high * q).sum(), rel=0.03, abs=3.0)
 
 
+def sided_twin(
+    surface: Surface, raster: Raster, points: NDArray[np.float64], pose: NDArray[np.float64]
+) -> int:
+    """Hits by NumPy, one plain raster for each direction that a point may face."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    placed = points @ np.array([[c, s], [-s, c]]) + pose[:2]
+    u, v = ((placed - raster.frame[:2]) * raster.frame[2]).T
+    height, width = raster.cells.shape
+    u, v = np.clip(u, 0, width - 1).astype(int), np.clip(v, 0, height - 1).astype(int)
+    normals, lines = surface.pieces[:, 5:7], scan_lines(points)
+    eighths = np.round(np.arctan2(normals[:, 1], normals[:, 0]) / (np.pi / 4))
+    own = np.floor((np.arctan2(lines[:, 1], lines[:, 0]) + pose[2]) / (np.pi / 4) + 0.5) % 8
+    hits = 0
+    for facing in range(8):
+        apart = np.abs((eighths - facing + 4) % 8 - 4)
+        these = (apart <= 2) | ~normals.any(axis=1)
+        segments, cells = surface.segments[these], np.zeros_like(raster.cells)
+        stamp_squares(segments, np.ones(len(segments), np.uint8), raster.frame, cells, raster.half_side)
+        looking = lines[:, :2].any(axis=1) & (own == facing)
+        hits += int(cells[v[looking], u[looking]].sum())
+    lone = ~lines[:, :2].any(axis=1)
+    return hits + int((raster.cells[v[lone], u[lone]] > 0).sum())
+
+
+@given(walks, walks, poses)
+@settings(deadline=None, max_examples=30)
+def test_sided_hits_agree_with_numpy(
+    reference: NDArray[np.float64], points: NDArray[np.float64], pose: NDArray[np.float64]
+) -> None:
+    pose = pose * [0.1, 0.1, 1.0]
+    surface = Surface.build(reference)
+    raster = Raster.of_sides(surface, 0.2, 0.05)
+    fitness = HitFitness.of(raster, points)
+    cells, xyf = raster.cells, fitness.scaled
+    found = count_sided(
+        cells.ravel(), cells.shape, raster.frame, *xyf, fitness.count, *pose.tolist(), 0, scratch()
+    )
+    assert abs(found - sided_twin(surface, raster, points, pose)) <= 1
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, 2.0, -3.0])
+def test_the_other_side_of_a_wall_is_no_hit(turn: float) -> None:
+    wall = np.column_stack((np.linspace(-2.0, 2.0, 101), np.full(101, 1.0)))
+    raster = Raster.of_sides(Surface.build(wall), 0.05, 0.025)
+    c, s = np.cos(turn), np.sin(turn)
+    turned = wall @ np.array([[c, -s], [s, c]])
+
+    def worth(points: NDArray[np.float64]) -> int:
+        fitness = HitFitness.of(raster, points)
+        flat, scaled = raster.cells.ravel(), fitness.scaled
+        return count_sided(
+            flat, raster.cells.shape, raster.frame, *scaled, fitness.count, 0.0, 0.0, turn, 0, scratch()
+        )
+
+    assert worth(turned) == 101
+    assert worth(turned[::-1].copy()) == 0
+    surface, pose = Surface.build(wall), np.array([0.0, 0.0, turn])
+    assert assess(surface, turned, pose, WINDOW, 0.1)[0] == 1.0
+    assert assess(surface, turned[::-1].copy(), pose, WINDOW, 0.1)[0] == 0.0
+
+
 def test_interpolation_tells_poses_apart_within_a_cell() -> None:
     points = corner()
     raster = Raster.smooth(Surface.build(points).segments, 0.05, 0.025)
@@ -236,7 +299,7 @@ def test_interpolation_tells_poses_apart_within_a_cell() -> None:
             raster.cells.ravel(),
             raster.cells.shape,
             raster.frame,
-            *fitness.scaled,
+            *fitness.scaled[:2],
             fitness.count,
             x,
             x,

@@ -171,7 +171,7 @@ def test_patience_ends_a_search_that_changes_nothing(name: str, budget: str, roo
     assert np.hypot(*(result.pose - truth)[:2]) < 0.03
 
 
-@pytest.mark.parametrize("fitness", ["paper", "surface", "likelihood"])
+@pytest.mark.parametrize("fitness", ["paper", "surface", "sides", "likelihood"])
 @pytest.mark.parametrize("name", POPULATION)
 def test_every_fitness_serves_every_search(name: str, fitness: str, room_pair: Pair) -> None:
     reference, scan, truth = room_pair

@@ -53,7 +53,7 @@ def test_the_weak_direction_agrees_with_numpy(seed: int, share: float) -> None:
 @pytest.mark.parametrize("turn", [0.0, 0.7, -2.5])
 def test_sliding_finds_the_pose_with_most_hits_along_a_corridor(off: float, turn: float) -> None:
     points, truth = corridor(), np.array([0.5, -0.3, turn])
-    raster = PopulationReference(transform(truth, points), PopulationConfig()).raster
+    raster = PopulationReference(transform(truth, points), PopulationConfig(fitness="surface")).raster
     fitness = HitFitness.of(raster, points)
     along = np.array([math.cos(turn), math.sin(turn), 0.0])
     start, window = truth + off * along, SearchWindow(0.31, 0.31, 0.2)

@@ -8,10 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
+from hsslam.kernels.blocks import LEAST_AGREEMENT
 from hsslam.kernels.histogram import BINS, median_of
 from hsslam.kernels.lines import MEDIAN
 from hsslam.kernels.matrix3 import deflate
-from hsslam.kernels.surface import Surface, nearest_segment, squared_distance
+from hsslam.kernels.surface import (
+    FIT_ROUGHNESS,
+    FIT_SPAN,
+    Surface,
+    lines_of,
+    nearest_segment,
+    squared_distance,
+)
 from hsslam.se2 import Points, Pose
 
 RANGE_STD = 0.01
@@ -32,7 +40,12 @@ DEGENERATE_SHARE = 0.1
 
 
 def assess(
-    surface: Surface, points: Points, pose: Pose, half: NDArray[np.float64], distance: float
+    surface: Surface,
+    points: Points,
+    pose: Pose,
+    half: NDArray[np.float64],
+    distance: float,
+    lines: NDArray[np.float64] | None = None,
 ) -> tuple[float, NDArray[np.float64], float]:
     """Score, covariance and degenerate direction of a scan at a pose.
 
@@ -47,7 +60,10 @@ def assess(
     half : float64 (3,)
         Half sides of the search window (m, m, rad): what is known of a direction that the points leave open.
     distance : float
-        Points within it of the surface count as matched (m), at most the surface's reach.
+        Points within it of the surface count as matched (m), at most the surface's reach, unless their line runs the
+        other way: they are of the other side of a wall.
+    lines : float64 (N, 3), optional
+        Through the points, see `lines_of`; made if they are left out.
 
     Returns
     -------
@@ -59,8 +75,10 @@ def assess(
     direction : float
         See `degenerate_direction`.
     """
+    if lines is None or len(lines) != len(points):
+        lines = lines_of(points, FIT_SPAN, FIT_ROUGHNESS)
     return measure(
-        surface.pieces, surface.tilts, surface.nearest, surface.frame, points, pose, half, distance
+        surface.pieces, surface.tilts, surface.nearest, surface.frame, points, lines, pose, half, distance
     )
 
 
@@ -71,6 +89,7 @@ def measure(
     nearest: NDArray[np.uint32],
     frame: NDArray[np.float64],
     points: Points,
+    lines: NDArray[np.float64],
     pose: Pose,
     half: NDArray[np.float64],
     distance: float,
@@ -84,7 +103,7 @@ def measure(
     the square of that step is added to the covariance.
     """
     matched, variance, hessian, feigned, gradient = gather(
-        pieces, tilts, nearest, frame, points, pose, distance
+        pieces, tilts, nearest, frame, points, lines, pose, distance
     )
     information = deflate(hessian, feigned, SPURIOUS) / (variance * CORRELATION)
     covariance = covariance_of(information, half)
@@ -146,10 +165,11 @@ def gather(
     nearest: NDArray[np.uint32],
     frame: NDArray[np.float64],
     points: Points,
+    lines: NDArray[np.float64],
     pose: Pose,
     distance: float,
 ) -> tuple[int, float, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Look at the points within ``distance`` of the surface.
+    """Look at the points within ``distance`` of the surface, those of the other side of a wall left out.
 
     Returns
     -------
@@ -180,8 +200,13 @@ def gather(
         k = nearest_segment(nearest, frame, x, y)
         if k < 0 or squared_distance(pieces, k, x, y) > distance * distance:
             continue
-        matched += 1
         nx, ny = pieces[k, 5], pieces[k, 6]
+        if (
+            nx * (c * lines[i, 0] - s * lines[i, 1]) + ny * (s * lines[i, 0] + c * lines[i, 1])
+            < -LEAST_AGREEMENT
+        ):
+            continue
+        matched += 1
         residual = nx * x + ny * y - pieces[k, 7]
         counts[min(int(abs(residual) / distance * BINS), BINS - 1)] += 1
         squares += min(residual * residual, distance * distance)

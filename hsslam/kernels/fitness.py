@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
+from hsslam.kernels.raster import ANY, EIGHTH, facing_of
 from hsslam.se2 import Points
 
 CHUNK = 32
@@ -24,23 +25,31 @@ _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 @kernel
-def scale(points: Points, per_metre: float, most: int) -> NDArray[np.float32]:
-    """Points in cells as `count_points` wants them, float32 (2, M): ``most`` of them, or all if there are fewer.
+def scale(
+    points: Points, lines: NDArray[np.float64], frame: NDArray[np.float64], most: int
+) -> NDArray[np.float32]:
+    """Points in cells, and the way they face, as `count_sided` wants them, float32 (3, M).
+
+    ``most`` of them, or all if there are fewer. The way they face is told by (N, 3) lines of the scan, where sides
+    count on the raster that ``frame`` is of.
 
     They come in an order in which any first part of them is spread over the whole scan, so that it stands for it.
     """
-    n, used = points.shape[0], min(most, points.shape[0])
+    n, used, per_metre = points.shape[0], min(most, points.shape[0]), frame[2]
+    sided = frame.shape[0] > 4 and lines.shape[0] == n
     stride = max(round(_GOLDEN * n), 1)
     while greatest_common_divisor(n, stride) > 1:
         stride += 1
-    out = np.empty((2, -(-used // CHUNK) * CHUNK), dtype=np.float32)
+    out = np.empty((3, -(-used // CHUNK) * CHUNK), dtype=np.float32)
     k = 0
     for i in range(used):
         out[0, i], out[1, i] = points[k, 0] * per_metre, points[k, 1] * per_metre
+        out[2, i] = facing_of(lines[k, 0], lines[k, 1]) if sided else -1.0
         k += stride
         if k >= n:
             k -= n
-    out[:, used:] = NOWHERE
+    out[:2, used:] = NOWHERE
+    out[2, used:] = -1.0
     return out
 
 
@@ -54,8 +63,8 @@ def greatest_common_divisor(a: int, b: int) -> int:
 
 @kernel
 def scratch() -> NDArray[np.uint32]:
-    """Memory for `count_points`, which a search makes once and not for every candidate, uint32 (CHUNK,)."""
-    return np.empty(CHUNK, dtype=np.uint32)
+    """Memory for `evaluate`, which a search makes once, uint32 (2 * CHUNK,)."""
+    return np.empty(2 * CHUNK, dtype=np.uint32)
 
 
 @kernel
@@ -69,7 +78,7 @@ def count_hits(
     theta: float,
     at_least: int,
 ) -> int:
-    """Sum of the points' worth on a raster (their hits, if it is a raster of squares) at a pose.
+    """Sum of the points' worth on a raster (their hits, if it is a raster of squares) at a pose; no sides count.
 
     Gives up with -1 as soon as the sum can no longer reach ``at_least``.
 
@@ -117,7 +126,7 @@ def count_points(
         vector instructions from the first point to the last.
     count : int
         How many are the scan's.
-    index : uint32 (CHUNK,)
+    index : uint32 (2 * CHUNK,)
         From `scratch`. Unsigned, so that the look-up needs no branch for indices counted from the end.
     """
     right, top = np.float32(shape[1] - 1), np.float32(shape[0] - 1)
@@ -147,6 +156,53 @@ def count_points(
                 hits += flat[np.uint32(np.int32(v) * stride + np.int32(u))]
         start += CHUNK
         if hits + most * max(count - start, 0) < at_least:
+            return -1
+    return hits
+
+
+@kernel
+def count_sided(
+    flat: NDArray[np.uint8],
+    shape: tuple[int, int],
+    frame: NDArray[np.float64],
+    xs: NDArray[np.float32],
+    ys: NDArray[np.float32],
+    facing: NDArray[np.float32],
+    count: int,
+    x: float,
+    y: float,
+    theta: float,
+    at_least: int,
+    index: NDArray[np.uint32],
+) -> int:
+    """As `count_points`, on a raster on which sides count: points hit what faces the same way.
+
+    ``facing``, float32 (N,), is how they do, seen from the scan, see `hsslam.kernels.raster.facing_of`: those of -1,
+    which have no line, hit whatever there is. `scale` makes it, with the points.
+    """
+    right, top = np.float32(shape[1] - 1), np.float32(shape[0] - 1)
+    zero = np.float32(0.0)
+    c, s = np.float32(math.cos(theta)), np.float32(math.sin(theta))
+    tx = np.float32((x - frame[0]) * frame[2])
+    ty = np.float32((y - frame[1]) * frame[2])
+    stride = np.int32(shape[1])
+    turned = np.float32((theta / EIGHTH) % 8.0 + 0.5)
+    one, seven, every = np.uint32(1), np.int32(7), np.uint32(ANY)
+    hits = 0
+    start = 0
+    while start < count:
+        # Points beyond the last are nowhere, on the raster's border, where nothing is to be hit.
+        for i in range(CHUNK):
+            px, py, way = xs[start + i], ys[start + i], facing[start + i]
+            u = min(max(c * px - s * py + tx, zero), right)
+            v = min(max(s * px + c * py + ty, zero), top)
+            index[i] = np.int32(v) * stride + np.int32(u)
+            side = one << np.uint32(np.int32(way + turned) & seven)
+            index[CHUNK + i] = side if way >= zero else every
+        for i in range(CHUNK):
+            hits += (flat[index[i]] & index[CHUNK + i]) != 0
+        start += CHUNK
+        if hits + max(count - start, 0) < at_least:
             return -1
     return hits
 
@@ -209,6 +265,7 @@ def evaluate(
     frame: NDArray[np.float64],
     xs: NDArray[np.float32],
     ys: NDArray[np.float32],
+    facing: NDArray[np.float32],
     count: int,
     x: float,
     y: float,
@@ -219,4 +276,6 @@ def evaluate(
     """What the population searches maximise: hits counted on squares, likelihood interpolated in a smooth field."""
     if frame[3] > 1.0:
         return interpolate_points(flat, shape, frame, xs, ys, count, x, y, theta, at_least, index)
+    if frame.shape[0] > 4:
+        return count_sided(flat, shape, frame, xs, ys, facing, count, x, y, theta, at_least, index)
     return count_points(flat, shape, frame, xs, ys, count, x, y, theta, at_least, index)

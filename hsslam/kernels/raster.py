@@ -13,13 +13,23 @@ from numpy.typing import NDArray
 
 from hsslam.jit import kernel
 from hsslam.kernels.growth import make_room
-from hsslam.kernels.surface import bounds
+from hsslam.kernels.surface import Surface, bounds
 from hsslam.se2 import Points
 
 MAXIMUM_CELLS_PER_SIDE = 4000
 
 FIELD_REACH = 2.5
 """A smooth field ends at this many standard deviations."""
+
+EIGHTH = 0.25 * math.pi
+"""An eighth of a turn (rad): directions that surfaces face are told apart in as many steps."""
+
+ANY = 255
+"""Mark of a cell that points hit whichever way they face."""
+
+BESIDE = 2
+"""Eighths of a turn by which a point may face another way than the surface that it hits: the other side of a wall
+faces four."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,10 +39,11 @@ class Raster:
     Parameters
     ----------
     cells : uint8 (H, W)
-        From 0 to ``top``.
-    frame : float64 (4,)
+        From 0 to ``top``; where sides count, a bit for each of eight directions that a point may face, seen from its
+        surface, to hit what is here.
+    frame : float64 (4,) or (5,)
         Position (m) of the corner of cell (0, 0), cells per metre, and the largest worth: 1 where hits are
-        counted, 255 for a smooth field.
+        counted, 255 for a smooth field. A fifth number says that sides count.
     half_side : float
         Of the squares, or standard deviation of the field (m).
     """
@@ -44,7 +55,20 @@ class Raster:
     @classmethod
     def build(cls, segments: NDArray[np.float64], half_side: float, resolution: float) -> Raster:
         """Squares of half side ``half_side`` (m) along (S, 4) segments; equal ends make a point."""
-        return cls(*rasterise_squares(segments, half_side, resolution), half_side)
+        marks = np.ones(len(segments), dtype=np.uint8)
+        return cls(*rasterise_squares(segments, marks, half_side, resolution), half_side)
+
+    @classmethod
+    def of_sides(cls, surface: Surface, half_side: float, resolution: float) -> Raster:
+        """Squares along a surface's segments, which only points hit that face the same way."""
+        marks = marks_of(surface.pieces)
+        cells, frame = rasterise_squares(surface.segments, marks, half_side, resolution)
+        return cls(cells, np.append(frame, 1.0), half_side)
+
+    @property
+    def sided(self) -> bool:
+        """Whether sides count."""
+        return len(self.frame) > 4
 
     @classmethod
     def of_points(cls, points: Points, half_side: float, resolution: float) -> Raster:
@@ -58,8 +82,11 @@ class Raster:
         stamp_field(segments, frame, cells, deviation, FIELD_REACH * deviation)
         return cls(cells, frame, deviation)
 
-    def extended(self, segments: NDArray[np.float64]) -> Raster | None:
-        """The raster with more (S, 4) segments; takes over this one's cells. None where it would be too large."""
+    def extended(self, segments: NDArray[np.float64], pieces: NDArray[np.float64]) -> Raster | None:
+        """The raster with more segments; takes over this one's cells. None where it would be too large.
+
+        (S, 4) segments and (S, 8) pieces are those of a `Surface`; of points, pieces that are zero.
+        """
         if len(segments) == 0:
             return self
         smooth = self.frame[3] > 1
@@ -73,8 +100,31 @@ class Raster:
         if smooth:
             stamp_field(segments, frame, cells, self.half_side, reach)
         else:
-            stamp_squares(segments, frame, cells, self.half_side)
+            marks = marks_of(pieces) if self.sided else np.ones(len(segments), dtype=np.uint8)
+            stamp_squares(segments, marks, frame, cells, self.half_side)
         return Raster(cells, frame, self.half_side)
+
+
+@kernel
+def facing_of(nx: float, ny: float) -> float:
+    """Which way a surface of this normal faces, in eighths of a turn from 0 to 8; -1 where it has none."""
+    if nx == 0.0 and ny == 0.0:
+        return -1.0
+    return (math.atan2(ny, nx) / EIGHTH) % 8.0
+
+
+@kernel
+def marks_of(pieces: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Directions that points may face to hit each of (S, 8) pieces of a `Surface`, as bits, uint8 (S,)."""
+    marks = np.empty(pieces.shape[0], dtype=np.uint8)
+    for k in range(pieces.shape[0]):
+        facing = facing_of(pieces[k, 5], pieces[k, 6])
+        mark = ANY if facing < 0.0 else 0
+        if facing >= 0.0:
+            for step in range(-BESIDE, BESIDE + 1):
+                mark |= 1 << ((int(facing + 0.5) + step) & 7)
+        marks[k] = mark
+    return marks
 
 
 @kernel
@@ -121,19 +171,23 @@ def stamp_field(
 
 @kernel
 def rasterise_squares(
-    segments: NDArray[np.float64], half_side: float, resolution: float
+    segments: NDArray[np.float64], marks: NDArray[np.uint8], half_side: float, resolution: float
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
     """Cells and frame of a raster of squares."""
     cells, frame = blank(segments, half_side, resolution, 1.0)
-    stamp_squares(segments, frame, cells, half_side)
+    stamp_squares(segments, marks, frame, cells, half_side)
     return cells, frame
 
 
 @kernel
 def stamp_squares(
-    segments: NDArray[np.float64], frame: NDArray[np.float64], cells: NDArray[np.uint8], half_side: float
+    segments: NDArray[np.float64],
+    marks: NDArray[np.uint8],
+    frame: NDArray[np.float64],
+    cells: NDArray[np.uint8],
+    half_side: float,
 ) -> None:
-    """Set the cells whose centre is in a square around some place of a segment to 1, in place.
+    """Add a segment's mark, uint8 (S,), to the cells whose centre is in a square around some place of it, in place.
 
     In a row of cells these form one run: the columns of the places of the segment that are within half a side
     of the row, and half a side more at each end.
@@ -157,4 +211,4 @@ def stamp_squares(
                 first, last = max(low, min(enters, leaves)), min(high, max(enters, leaves))
             start = np.uint64(row * columns + math.ceil(first - half))
             for column in range(math.floor(last + half) - math.ceil(first - half) + 1):
-                flat[start + np.uint64(column)] = 1
+                flat[start + np.uint64(column)] |= marks[k]

@@ -256,7 +256,7 @@ class Matcher(ABC, Generic[ConfigT]):
             pose, converged, covariance = guess, False, None
         pose = np.array([pose[0], pose[1], wrap(pose[2])])
         score, estimated, direction = assess(
-            reference.surface, points, pose, window.half, self.config.score_distance
+            reference.surface, points, pose, window.half, self.config.score_distance, found.lines
         )
         if not math.isnan(direction):
             diagnostics = {**diagnostics, "degenerate_direction": direction}

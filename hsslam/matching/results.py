@@ -28,6 +28,9 @@ class Estimate:
         Of the pose, if the method has one of its own; else the framework computes one.
     diagnostics : mapping
         Anything else worth knowing; JSON types only.
+    lines : float64 (N, 3), optional
+        Of the scan's points, as `hsslam.search.scan_lines` makes them, if the method needed them: the framework, which
+        does, too, need not make them again.
     """
 
     pose: Pose
@@ -35,6 +38,7 @@ class Estimate:
     evaluations: int = 0
     covariance: NDArray[np.float64] | None = None
     diagnostics: Mapping[str, Any] = field(default_factory=dict)
+    lines: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,7 @@ class MatchResult:
         Of ``(x, y, theta)`` in the reference's frame (m, m, rad); always positive definite.
     score : float
         Share of the scan's points, in [0, 1], that lie within ``score_distance`` of the reference surface at
-        ``pose``: the same yardstick for every matcher.
+        ``pose``, on the side that they see: the same yardstick for every matcher.
     converged : bool
         False where the method failed, or its answer was rejected.
     evaluations : int

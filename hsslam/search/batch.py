@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from hsslam.jit import kernel
 from hsslam.kernels.assess import measure
 from hsslam.kernels.window import inside
 from hsslam.se2 import Points, Pose, Poses, wrap
+from hsslam.search.polish import scan_lines
 from hsslam.search.settle import settle
 
 
@@ -45,15 +47,29 @@ class Batch:
     def __len__(self) -> int:
         return len(self.ends)
 
+    @cached_property
+    def lines(self) -> NDArray[np.float64]:
+        """Lines (M, 3) through the points, each scan's own."""
+        return lines_of_all(self.points, self.ends)
+
     def scan(self, i: int) -> Points:
         """Points (N_i, 2) of scan ``i``."""
         return part(self.points, self.ends, i)
 
 
 @kernel
-def part(points: Points, ends: NDArray[np.int64], i: int) -> Points:
-    """Points of scan ``i`` of a batch."""
-    return points[(ends[i - 1] if i > 0 else 0) : ends[i]]
+def part(rows: NDArray[np.float64], ends: NDArray[np.int64], i: int) -> NDArray[np.float64]:
+    """Rows, of its points or its lines, of scan ``i`` of a batch."""
+    return rows[(ends[i - 1] if i > 0 else 0) : ends[i]]
+
+
+@kernel
+def lines_of_all(points: Points, ends: NDArray[np.int64]) -> NDArray[np.float64]:
+    """`scan_lines` of each scan of a batch, (M, 3)."""
+    lines = np.empty((points.shape[0], 3))
+    for i in range(ends.shape[0]):
+        part(lines, ends, i)[:] = scan_lines(part(points, ends, i))
+    return lines
 
 
 @kernel
@@ -65,6 +81,7 @@ def settle_all(
     cells: NDArray[np.uint8],
     frame: NDArray[np.float64],
     points: Points,
+    lines: NDArray[np.float64],
     ends: NDArray[np.int64],
     guesses: Poses,
     found: Poses,
@@ -81,7 +98,7 @@ def settle_all(
         Of the reference's `Surface`.
     cells, frame : arrays
         Of the raster that was searched.
-    points, ends, guesses : arrays
+    points, lines, ends, guesses : arrays
         Of a `Batch`.
     found : Poses
         (N, 3) what the search found.
@@ -103,16 +120,16 @@ def settle_all(
     poses, covariances = np.empty((count, 3)), np.empty((count, 3, 3))
     scores, converged = np.empty(count), np.empty(count, dtype=np.bool_)
     for i in range(count):
-        scan, guess = part(points, ends, i), guesses[i]
+        scan, its, guess = part(points, ends, i), part(lines, ends, i), guesses[i]
         pose: Pose = found[i].copy()
         if iterations > 0:
             pose, _, _ = settle(
-                pieces, nearest, surface_frame, cells, frame, scan, pose, guess, half, iterations, step
+                pieces, nearest, surface_frame, cells, frame, scan, its, pose, guess, half, iterations, step
             )
         converged[i] = inside(guess, half, pose)
         poses[i] = pose if converged[i] else guess
         poses[i, 2] = wrap(poses[i, 2])
         scores[i], covariances[i], _ = measure(
-            pieces, tilts, nearest, surface_frame, scan, poses[i], half, distance
+            pieces, tilts, nearest, surface_frame, scan, its, poses[i], half, distance
         )
     return poses, covariances, scores, converged

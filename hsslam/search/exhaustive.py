@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from hsslam.errors import ConfigError
 from hsslam.kernels.certify import certify, with_dominoes
 from hsslam.kernels.correlative import BLOCKS, SIDES, best_of_lattice, pool, posterior_mean
 from hsslam.kernels.fitness import count_hits
@@ -58,6 +59,8 @@ class ExhaustiveReference(Reference):
     def __init__(self, points: Points, fitness: FitnessName, half_side: float, resolution: float) -> None:
         super().__init__(points)
         self.raster: Raster = build_raster(fitness, points, self.surface, half_side, resolution)
+        if self.raster.sided:
+            raise ConfigError(f"fitness {fitness!r}: an exhaustive search knows no sides; choose 'surface'")
         self.pooled: NDArray[np.uint8] = pool(self.raster.cells, _SIDES)
 
     @cached_property

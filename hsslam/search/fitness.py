@@ -13,8 +13,12 @@ from hsslam.kernels.raster import Raster
 from hsslam.kernels.surface import Surface
 from hsslam.se2 import Points
 from hsslam.search.fitness_functions import FitnessName, load_fitness
+from hsslam.search.polish import scan_lines
 
 __all__ = ["FitnessName", "HitFitness", "build_raster"]
+
+
+_NO_LINES: NDArray[np.float64] = np.empty((0, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +29,8 @@ class HitFitness:
     ----------
     cells, frame : arrays
         Of the reference's `Raster`.
-    scaled : float32 (2, M)
-        The scan's points in cells, as `hsslam.kernels.fitness.scale` orders and pads them.
+    scaled : float32 (3, M)
+        The scan's points in cells, and the way they face, as `hsslam.kernels.fitness.scale` orders and pads them.
     count : int
         How many there are.
     """
@@ -37,10 +41,21 @@ class HitFitness:
     count: int
 
     @classmethod
-    def of(cls, raster: Raster, points: Points, most: int | None = None) -> HitFitness:
-        """Fitness of (N, 2) points against a raster: of all, or of ``most`` spread over the scan."""
+    def of(
+        cls,
+        raster: Raster,
+        points: Points,
+        most: int | None = None,
+        lines: NDArray[np.float64] | None = None,
+    ) -> HitFitness:
+        """Fitness of (N, 2) points against a raster: of all, or of ``most`` spread over the scan.
+
+        Where sides count, (N, 3) `scan_lines` tell which way points face; they are made if they are left out.
+        """
         count = len(points) if most is None else min(most, len(points))
-        return cls(raster.cells, raster.frame, scale(points, raster.frame[2], count), count)
+        if lines is None:
+            lines = scan_lines(points) if raster.sided else _NO_LINES
+        return cls(raster.cells, raster.frame, scale(points, lines, raster.frame, count), count)
 
     @property
     def xs(self) -> NDArray[np.float32]:

@@ -46,6 +46,11 @@ def _surface(points: Points, surface: Surface, half_side: float, resolution: flo
     return Raster.build(surface.segments, half_side, resolution)
 
 
+def _sides(points: Points, surface: Surface, half_side: float, resolution: float) -> Raster:
+    """The same, for points that see the side of the wall that the reference saw."""
+    return Raster.of_sides(surface, half_side, resolution)
+
+
 def _likelihood(points: Points, surface: Surface, half_side: float, resolution: float) -> Raster:
     """A Gaussian of the distance from the segments, of standard deviation ``half_side``, in steps of 1/255."""
     return Raster.smooth(surface.segments, half_side, resolution)
@@ -59,7 +64,7 @@ _functions: Registry[FitnessFunction] = Registry(
     "fitness function",
     GROUP,
     fault=_fault,
-    builtin={"paper": _paper, "surface": _surface, "likelihood": _likelihood},
+    builtin={"paper": _paper, "surface": _surface, "sides": _sides, "likelihood": _likelihood},
 )
 
 

@@ -73,7 +73,8 @@ def genetic_search(
     (Pose, int, int)
         Best pose, its hits, and how often the fitness was evaluated.
     """
-    flat, xs, ys, index, state = cells.reshape(cells.size), scaled[0], scaled[1], scratch(), seeded(seed)
+    flat, index, state = cells.reshape(cells.size), scratch(), seeded(seed)
+    xs, ys, facing = scaled[0], scaled[1], scaled[2]
     genes = np.empty((population_size, 3), dtype=np.int64)
     children = np.empty((population_size, 3), dtype=np.int64)
     hits = np.zeros(population_size, dtype=np.int64)
@@ -87,7 +88,7 @@ def genetic_search(
             x = decode(genes[i, 0], bits, guess[0], half[0])
             y = decode(genes[i, 1], bits, guess[1], half[1])
             theta = decode(genes[i, 2], bits, guess[2], half[2])
-            hits[i] = evaluate(flat, cells.shape, frame, xs, ys, count, x, y, theta, 0, index)
+            hits[i] = evaluate(flat, cells.shape, frame, xs, ys, facing, count, x, y, theta, 0, index)
             if hits[i] > best_hits:
                 best_hits = hits[i]
                 best_genes[:] = genes[i]
@@ -120,6 +121,7 @@ def genetic_search_all(
     cells: NDArray[np.uint8],
     frame: NDArray[np.float64],
     points: Points,
+    lines: NDArray[np.float64],
     ends: NDArray[np.int64],
     guesses: Poses,
     most: int,
@@ -140,7 +142,7 @@ def genetic_search_all(
         found[i], _, spent[i] = genetic_search(
             cells,
             frame,
-            scale(scan, frame[2], count),
+            scale(scan, part(lines, ends, i), frame, count),
             count,
             guesses[i],
             half,

@@ -71,13 +71,24 @@ def fill_memory(
     trace: NDArray[np.float64],
 ) -> None:
     """Fill the memory: the guess itself, then harmonies uniform in the window (paper, equations 1, 5 and 6)."""
-    flat, xs, ys = cells.reshape(cells.size), scaled[0], scaled[1]
+    flat, xs, ys, facing = cells.reshape(cells.size), scaled[0], scaled[1], scaled[2]
     for i in range(memory.shape[0]):
         for d in range(3):
             offset = 0.0 if i == 0 else (2.0 * uniform(state) - 1.0) * half[d]
             memory[i, d] = guess[d] + offset
         hits[i] = evaluate(
-            flat, cells.shape, frame, xs, ys, count, memory[i, 0], memory[i, 1], memory[i, 2], 0, index
+            flat,
+            cells.shape,
+            frame,
+            xs,
+            ys,
+            facing,
+            count,
+            memory[i, 0],
+            memory[i, 1],
+            memory[i, 2],
+            0,
+            index,
         )
         if i < trace.shape[0]:
             record(trace, i, memory, hits[: i + 1])
@@ -134,7 +145,8 @@ def harmony_search(
     (Pose, int, int)
         Best harmony, its hits, and how often the fitness was evaluated.
     """
-    flat, xs, ys, index, state = cells.reshape(cells.size), scaled[0], scaled[1], scratch(), seeded(seed)
+    flat, index, state = cells.reshape(cells.size), scratch(), seeded(seed)
+    xs, ys, facing = scaled[0], scaled[1], scaled[2]
     memory = np.empty((memory_size, 3))
     hits = np.empty(memory_size, dtype=np.int64)
     fill_memory(cells, frame, scaled, count, guess, half, index, state, memory, hits, trace)
@@ -149,7 +161,7 @@ def harmony_search(
         rate = par_min + (par_max - par_min) * t / improvisations
         improvise(memory, guess, half, memory_considering_rate, rate, bandwidth, state, candidate)
         x, y, theta = candidate
-        found = evaluate(flat, cells.shape, frame, xs, ys, count, x, y, theta, hits[worst] + 1, index)
+        found = evaluate(flat, cells.shape, frame, xs, ys, facing, count, x, y, theta, hits[worst] + 1, index)
         if found > hits[worst]:
             memory[worst] = candidate
             hits[worst] = found
@@ -170,6 +182,7 @@ def harmony_search_all(
     cells: NDArray[np.uint8],
     frame: NDArray[np.float64],
     points: Points,
+    lines: NDArray[np.float64],
     ends: NDArray[np.int64],
     guesses: Poses,
     most: int,
@@ -197,7 +210,7 @@ def harmony_search_all(
         found[i], _, spent[i] = harmony_search(
             cells,
             frame,
-            scale(scan, frame[2], count),
+            scale(scan, part(lines, ends, i), frame, count),
             count,
             guesses[i],
             half,

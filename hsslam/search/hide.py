@@ -96,7 +96,8 @@ bandwidth_min, bandwidth_max, patience, seed, trace
     (Pose, int, int)
         Best harmony, its hits, and how often the fitness was evaluated, the memory's filling included.
     """
-    flat, xs, ys, index, state = cells.reshape(cells.size), scaled[0], scaled[1], scratch(), seeded(seed)
+    flat, index, state = cells.reshape(cells.size), scratch(), seeded(seed)
+    xs, ys, facing = scaled[0], scaled[1], scaled[2]
     memory = np.empty((memory_size, 3))
     hits = np.empty(memory_size, dtype=np.int64)
     fill_memory(cells, frame, scaled, count, guess, half, index, state, memory, hits, trace)
@@ -111,7 +112,9 @@ bandwidth_min, bandwidth_max, patience, seed, trace
             rate = par_min + (par_max - par_min) * spent / budget
             improvise(memory, guess, half, memory_considering_rate, rate, bandwidth, state, candidate)
             x, y, theta = candidate
-            found = evaluate(flat, cells.shape, frame, xs, ys, count, x, y, theta, hits[worst] + 1, index)
+            found = evaluate(
+                flat, cells.shape, frame, xs, ys, facing, count, x, y, theta, hits[worst] + 1, index
+            )
             for d in range(3):
                 bandwidth[d] *= shrink[d]
             spent += 1
@@ -127,7 +130,9 @@ bandwidth_min, bandwidth_max, patience, seed, trace
         for target in range(min(memory_size, budget - spent)):
             evolve(memory, target, best, guess, half, attraction, weight, crossover_rate, state, candidate)
             x, y, theta = candidate
-            found = evaluate(flat, cells.shape, frame, xs, ys, count, x, y, theta, hits[target] + 1, index)
+            found = evaluate(
+                flat, cells.shape, frame, xs, ys, facing, count, x, y, theta, hits[target] + 1, index
+            )
             spent += 1
             idle += 1
             if found > hits[target]:
@@ -147,6 +152,7 @@ def hide_search_all(
     cells: NDArray[np.uint8],
     frame: NDArray[np.float64],
     points: Points,
+    lines: NDArray[np.float64],
     ends: NDArray[np.int64],
     guesses: Poses,
     most: int,
@@ -172,7 +178,7 @@ def hide_search_all(
         found[i], _, spent[i] = hide_search(
             cells,
             frame,
-            scale(scan, frame[2], count),
+            scale(scan, part(lines, ends, i), frame, count),
             count,
             guesses[i],
             half,

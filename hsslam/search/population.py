@@ -17,8 +17,9 @@ from hsslam.kernels.surface import Surface
 from hsslam.matching.interface import MINIMUM_POINTS, Matcher, MatcherConfig, Reference, SearchWindow, clean
 from hsslam.matching.results import Estimate, Matches
 from hsslam.se2 import Points, Pose, Poses
-from hsslam.search.batch import Batch, settle_all
+from hsslam.search.batch import Batch, part, settle_all
 from hsslam.search.fitness import FitnessName, HitFitness, build_raster
+from hsslam.search.polish import scan_lines
 from hsslam.search.settle import settle
 
 NO_TRACE: NDArray[np.float64] = np.empty((0, 4))
@@ -29,9 +30,9 @@ class PopulationConfig(MatcherConfig):
     """Parameters of the fitness and the refinement."""
 
     fitness: FitnessName = Field(
-        default="surface",
-        description="`paper`: squares around the points; `surface`: squares along the segments between them; "
-        "`likelihood`: a smooth field around these",
+        default="sides",
+        description="`paper`: squares around the points; `surface`: squares along the segments between them; `sides`: "
+        "of these, those of the side of a wall that the scan sees; `likelihood`: a smooth field around them",
     )
     half_side: float = Field(
         default=0.05, gt=0.0, le=1.0, description="half side of the squares of the fitness (m)"
@@ -78,9 +79,9 @@ class PopulationReference(Reference):
         # A plugin's raster may follow from all the points in any way: only our own are known to grow.
         raster = None
         if self._config.fitness == "paper":
-            raster = self.raster.extended(np.hstack((points, points)))
-        elif self._config.fitness in ("surface", "likelihood"):
-            raster = self.raster.extended(surface.segments[known:])
+            raster = self.raster.extended(np.hstack((points, points)), np.zeros((len(points), 8)))
+        elif self._config.fitness in ("surface", "sides", "likelihood"):
+            raster = self.raster.extended(surface.segments[known:], surface.pieces[known:])
         return PopulationReference(every, self._config, surface, raster)
 
     def _build(self, scale: float) -> Raster:
@@ -141,7 +142,7 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
         """
         found, spent = np.empty((len(batch), 3)), np.empty(len(batch), dtype=np.int64)
         for i, guess in enumerate(batch.guesses):
-            fitness = HitFitness.of(raster, batch.scan(i), most)
+            fitness = HitFitness.of(raster, batch.scan(i), most, part(batch.lines, batch.ends, i))
             found[i], _, spent[i] = self.search(fitness, guess, window, rng)
         return found, spent
 
@@ -178,6 +179,7 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
                 raster.cells,
                 raster.frame,
                 batch.points,
+                batch.lines,
                 batch.ends,
                 batch.guesses,
                 found,
@@ -201,11 +203,12 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
         wide = self.is_wide(window)
         raster = reference.coarse if wide else reference.raster
         few = self.config.refine and not wide
-        fitness = HitFitness.of(raster, points, self.config.search_points if few else None)
+        lines = scan_lines(points)
+        fitness = HitFitness.of(raster, points, self.config.search_points if few else None, lines)
         found, hits, evaluations = self.search(fitness, guess, window, rng)
         diagnostics: dict[str, Any] = {"fitness": fitness.share(hits)}
         if not self.config.refine:
-            return Estimate(found, evaluations=evaluations, diagnostics=diagnostics)
+            return Estimate(found, evaluations=evaluations, diagnostics=diagnostics, lines=lines)
         surface = reference.surface
         pose, diagnostics["refine_iterations"], looked = settle(
             surface.pieces,
@@ -214,13 +217,14 @@ class PopulationMatcher(Matcher[PopulationConfigT], Generic[PopulationConfigT]):
             raster.cells,
             raster.frame,
             points,
+            lines,
             found,
             guess,
             window.half,
             self.config.refine_iterations,
             0.0 if wide else self.config.half_side,
         )
-        return Estimate(pose, evaluations=evaluations + looked, diagnostics=diagnostics)
+        return Estimate(pose, evaluations=evaluations + looked, diagnostics=diagnostics, lines=lines)
 
 
 class KernelMatcher(PopulationMatcher[PopulationConfigT], Generic[PopulationConfigT]):
@@ -272,6 +276,7 @@ class KernelMatcher(PopulationMatcher[PopulationConfigT], Generic[PopulationConf
             raster.cells,
             raster.frame,
             batch.points,
+            batch.lines,
             batch.ends,
             batch.guesses,
             most,

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hsslam.jit import kernel
 from hsslam.se2 import Points, Pose
-from hsslam.search.polish import polished, scan_lines
+from hsslam.search.polish import polished
 from hsslam.search.slide import slid
 
 
@@ -19,6 +19,7 @@ def settle(
     cells: NDArray[np.uint8],
     frame: NDArray[np.float64],
     points: Points,
+    lines: NDArray[np.float64],
     found: Pose,
     guess: Pose,
     half: NDArray[np.float64],
@@ -35,6 +36,8 @@ def settle(
         Of the raster that was searched.
     points : Points
         (N, 2) m, the scan.
+    lines : float64 (N, 3)
+        Through its points: see `hsslam.search.polish.scan_lines`.
     found, guess : Pose
         What the search found, and the middle of its window.
     half : float64 (3,)
@@ -49,7 +52,6 @@ def settle(
     (Pose, int, int)
         The refined pose, iterations spent, and poses looked at along the corridor.
     """
-    lines = scan_lines(points)
     pose, spent = polished(pieces, nearest, surface_frame, points, lines, found, guess, half, iterations)
     looked = 0
     if step > 0.0:

@@ -93,10 +93,10 @@ def slid(
     if math.isnan(direction):
         return False, best, 0
     count = points.shape[0]
-    scaled = scale(points, frame[2], count)
-    flat, xs, ys, index = cells.reshape(cells.size), scaled[0], scaled[1], scratch()
+    scaled = scale(points, lines, frame, count)
+    flat, xs, ys, facing, index = cells.reshape(cells.size), scaled[0], scaled[1], scaled[2], scratch()
     x, y, theta = pose
-    here = evaluate(flat, cells.shape, frame, xs, ys, count, x, y, theta, 0, index)
+    here = evaluate(flat, cells.shape, frame, xs, ys, facing, count, x, y, theta, 0, index)
     ux, uy = math.cos(theta + direction), math.sin(theta + direction)
     most, spent = here, 1
     steps = int(2.0 * math.hypot(half[0], half[1]) / step)
@@ -105,7 +105,7 @@ def slid(
         if k == 0 or abs(x - guess[0]) > half[0] or abs(y - guess[1]) > half[1]:
             continue
         spent += 1
-        hits = evaluate(flat, cells.shape, frame, xs, ys, count, x, y, theta, most + 1, index)
+        hits = evaluate(flat, cells.shape, frame, xs, ys, facing, count, x, y, theta, most + 1, index)
         if hits > most:
             most = hits
             best[0], best[1] = x, y

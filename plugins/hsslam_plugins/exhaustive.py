@@ -10,11 +10,17 @@ from pydantic import Field
 from hsslam.matching import Estimate, Matcher, Points, Pose, Reference, SearchWindow, clean
 from hsslam.search import PopulationConfig
 from hsslam.search.exhaustive import ExhaustiveReference, lattice_search, window_search
+from hsslam.search.fitness import FitnessName
 from hsslam.search.polish import polish, scan_lines
 
 
 class ExhaustiveConfig(PopulationConfig):
     """Parameters of the exhaustive search; those of the fitness as for the population searches."""
+
+    fitness: FitnessName = Field(
+        default="surface",
+        description="as for `hide`, but not `sides`: what is proven is proven of places, whichever way points face",
+    )
 
     proof: Literal["window", "lattice"] = Field(
         default="window",

@@ -14,8 +14,8 @@ class GlasmConfig(PopulationConfig):
 
     fitness: FitnessName = Field(
         default="paper",
-        description="`paper`: squares around the points; `surface`: squares along the segments between them; "
-        "`likelihood`: a smooth field around these",
+        description="`paper`: squares around the points; `surface`: squares along the segments between them; `sides`: "
+        "of these, those of the side of a wall that the scan sees; `likelihood`: a smooth field around them",
     )
     half_side: float = Field(
         default=0.0525,
