@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from hsslam.kernels.assess import assess, degenerate_direction
 from hsslam.kernels.fitness import count_hits, count_sided, interpolate_points, scratch
 from hsslam.kernels.raster import Raster, stamp_squares
-from hsslam.kernels.surface import Surface
+from hsslam.kernels.surface import Surface, scan_lines
 from hsslam.search import HitFitness
-from hsslam.search.polish import scan_lines
 
 coordinates = st.floats(-4.0, 4.0, allow_nan=False)
 clouds = st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=200).map(

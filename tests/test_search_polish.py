@@ -10,11 +10,12 @@ import pytest
 
 from hsslam.datasets.simulator import raycast, simulate_pairs
 from hsslam.kernels.refine import NO_LINES, refine
+from hsslam.kernels.surface import scan_lines
 from hsslam.matching import create
 from hsslam.matching.interface import Reference, SearchWindow
 from hsslam.scan import LaserScan, ScanGeometry
 from hsslam.se2 import Points, Pose, between, pose, transform
-from hsslam.search.polish import REACHES, SCALES, SETTLE, polish, scan_lines
+from hsslam.search.polish import REACHES, SCALES, SETTLE, polish
 
 WALL = 0.12
 """Thickness of the wall between two rooms (m)."""

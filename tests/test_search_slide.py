@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hsslam.kernels.fitness import count_hits
+from hsslam.kernels.surface import scan_lines
 from hsslam.matching import SearchWindow, create
 from hsslam.se2 import Points, Pose, between, transform
 from hsslam.search import HitFitness
-from hsslam.search.polish import scan_lines
 from hsslam.search.population import PopulationConfig, PopulationReference
 from hsslam.search.slide import GAIN, WEAK, slide, weak_direction
 

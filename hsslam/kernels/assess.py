@@ -12,14 +12,7 @@ from hsslam.kernels.blocks import LEAST_AGREEMENT
 from hsslam.kernels.histogram import BINS, median_of
 from hsslam.kernels.lines import MEDIAN
 from hsslam.kernels.matrix3 import deflate
-from hsslam.kernels.surface import (
-    FIT_ROUGHNESS,
-    FIT_SPAN,
-    Surface,
-    lines_of,
-    nearest_segment,
-    squared_distance,
-)
+from hsslam.kernels.surface import Surface, nearest_segment, scan_lines, squared_distance
 from hsslam.se2 import Points, Pose
 
 RANGE_STD = 0.01
@@ -63,7 +56,7 @@ def assess(
         Points within it of the surface count as matched (m), at most the surface's reach, unless their line runs the
         other way: they are of the other side of a wall.
     lines : float64 (N, 3), optional
-        Through the points, see `lines_of`; made if they are left out.
+        Through the points, see `scan_lines`; made if they are left out.
 
     Returns
     -------
@@ -76,7 +69,7 @@ def assess(
         See `degenerate_direction`.
     """
     if lines is None or len(lines) != len(points):
-        lines = lines_of(points, FIT_SPAN, FIT_ROUGHNESS)
+        lines = scan_lines(points)
     return measure(
         surface.pieces, surface.tilts, surface.nearest, surface.frame, points, lines, pose, half, distance
     )

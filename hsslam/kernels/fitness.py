@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.jit import kernel
-from hsslam.kernels.raster import ANY, EIGHTH, facing_of
+from hsslam.kernels.raster import ANY, EIGHTH, counts_sides, facing_of
 from hsslam.se2 import Points
 
 CHUNK = 32
@@ -36,7 +36,7 @@ def scale(
     They come in an order in which any first part of them is spread over the whole scan, so that it stands for it.
     """
     n, used, per_metre = points.shape[0], min(most, points.shape[0]), frame[2]
-    sided = frame.shape[0] > 4 and lines.shape[0] == n
+    sided = counts_sides(frame) and lines.shape[0] == n
     stride = max(round(_GOLDEN * n), 1)
     while greatest_common_divisor(n, stride) > 1:
         stride += 1
@@ -276,6 +276,6 @@ def evaluate(
     """What the population searches maximise: hits counted on squares, likelihood interpolated in a smooth field."""
     if frame[3] > 1.0:
         return interpolate_points(flat, shape, frame, xs, ys, count, x, y, theta, at_least, index)
-    if frame.shape[0] > 4:
+    if counts_sides(frame):
         return count_sided(flat, shape, frame, xs, ys, facing, count, x, y, theta, at_least, index)
     return count_points(flat, shape, frame, xs, ys, count, x, y, theta, at_least, index)

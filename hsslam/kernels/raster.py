@@ -68,7 +68,7 @@ class Raster:
     @property
     def sided(self) -> bool:
         """Whether sides count."""
-        return len(self.frame) > 4
+        return counts_sides(self.frame)
 
     @classmethod
     def of_points(cls, points: Points, half_side: float, resolution: float) -> Raster:
@@ -103,6 +103,12 @@ class Raster:
             marks = marks_of(pieces) if self.sided else np.ones(len(segments), dtype=np.uint8)
             stamp_squares(segments, marks, frame, cells, self.half_side)
         return Raster(cells, frame, self.half_side)
+
+
+@kernel
+def counts_sides(frame: NDArray[np.float64]) -> bool:
+    """Whether sides count on the raster of this frame."""
+    return len(frame) > 4
 
 
 @kernel

@@ -181,6 +181,12 @@ def lines_of(points: Points, span: float, roughness: float) -> NDArray[np.float6
 
 
 @kernel
+def scan_lines(points: Points) -> NDArray[np.float64]:
+    """Lines through a scan's (N, 2) points, see `lines_of`: fitted as those of a reference's surface are."""
+    return lines_of(points, FIT_SPAN, FIT_ROUGHNESS)
+
+
+@kernel
 def squared_distance(pieces: NDArray[np.float64], k: int, x: float, y: float) -> float:
     """Squared distance (m^2) of a place from segment ``k``, given `Surface.pieces`."""
     px, py = x - pieces[k, 0], y - pieces[k, 1]

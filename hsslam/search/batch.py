@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from hsslam.jit import kernel
 from hsslam.kernels.assess import measure
+from hsslam.kernels.surface import scan_lines
 from hsslam.kernels.window import inside
 from hsslam.se2 import Points, Pose, Poses, wrap
-from hsslam.search.polish import scan_lines
 from hsslam.search.settle import settle
 
 

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from hsslam.errors import ConfigError
 from hsslam.kernels.fitness import scale
 from hsslam.kernels.raster import Raster
-from hsslam.kernels.surface import Surface
+from hsslam.kernels.surface import Surface, scan_lines
 from hsslam.se2 import Points
 from hsslam.search.fitness_functions import FitnessName, load_fitness
-from hsslam.search.polish import scan_lines
 
 __all__ = ["FitnessName", "HitFitness", "build_raster"]
 

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from hsslam.jit import kernel
 from hsslam.kernels.refine import refine
-from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, lines_of
 from hsslam.kernels.window import inside, kept
 from hsslam.matching.interface import Reference, SearchWindow
 from hsslam.se2 import Points, Pose
@@ -26,12 +25,6 @@ WINDOW_SLACK = 0.4
 """A refined pose outside the window by up to this share of its half sides is moved onto its edge.
 
 Where a truth lies near the edge, noise alone carries the refined pose across it."""
-
-
-@kernel
-def scan_lines(points: Points) -> NDArray[np.float64]:
-    """Lines through a scan's (N, 2) points as `polish` wants them, see `hsslam.kernels.surface.lines_of`."""
-    return lines_of(points, FIT_SPAN, FIT_ROUGHNESS)
 
 
 @kernel

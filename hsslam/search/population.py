@@ -13,13 +13,12 @@ from pydantic import Field
 
 from hsslam.kernels.random import seed_of, seeds_of
 from hsslam.kernels.raster import Raster
-from hsslam.kernels.surface import Surface
+from hsslam.kernels.surface import Surface, scan_lines
 from hsslam.matching.interface import MINIMUM_POINTS, Matcher, MatcherConfig, Reference, SearchWindow, clean
 from hsslam.matching.results import Estimate, Matches
 from hsslam.se2 import Points, Pose, Poses
 from hsslam.search.batch import Batch, part, settle_all
 from hsslam.search.fitness import FitnessName, HitFitness, build_raster
-from hsslam.search.polish import scan_lines
 from hsslam.search.settle import settle
 
 NO_TRACE: NDArray[np.float64] = np.empty((0, 4))

@@ -37,7 +37,7 @@ def settle(
     points : Points
         (N, 2) m, the scan.
     lines : float64 (N, 3)
-        Through its points: see `hsslam.search.polish.scan_lines`.
+        Through its points: see `hsslam.kernels.surface.scan_lines`.
     found, guess : Pose
         What the search found, and the middle of its window.
     half : float64 (3,)

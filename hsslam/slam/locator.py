@@ -10,10 +10,10 @@ import numpy as np
 
 from hsslam.config import TrackerSection
 from hsslam.kernels.assess import assess
+from hsslam.kernels.surface import scan_lines
 from hsslam.matching.interface import MINIMUM_POINTS, Matcher, SearchWindow
 from hsslam.matching.results import MatchResult
 from hsslam.se2 import Points, Pose
-from hsslam.search.polish import scan_lines
 from hsslam.search.slide import weak_direction
 from hsslam.slam.expectation import USUAL, Expectation
 from hsslam.slam.stopwatch import Stopwatch

@@ -7,11 +7,12 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
+from hsslam.kernels.surface import scan_lines
 from hsslam.matching import Estimate, Matcher, Points, Pose, Reference, SearchWindow, clean
 from hsslam.search import PopulationConfig
 from hsslam.search.exhaustive import ExhaustiveReference, lattice_search, window_search
 from hsslam.search.fitness import FitnessName
-from hsslam.search.polish import polish, scan_lines
+from hsslam.search.polish import polish
 
 
 class ExhaustiveConfig(PopulationConfig):
@@ -21,7 +22,6 @@ class ExhaustiveConfig(PopulationConfig):
         default="surface",
         description="as for `hide`, but not `sides`: what is proven is proven of places, whichever way points face",
     )
-
     proof: Literal["window", "lattice"] = Field(
         default="window",
         description="`window`: the best of all poses in the window; `lattice`: the best of those a cell of the "
