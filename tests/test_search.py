@@ -182,6 +182,33 @@ def test_every_fitness_serves_every_search(name: str, fitness: str, room_pair: P
     assert np.hypot(*(result.pose - truth)[:2]) < 0.08
 
 
+def along(*corners: tuple[float, float]) -> np.ndarray:
+    """Returns every 2 cm from one corner to the next, with 5 mm of noise."""
+    legs = [np.linspace(p, q, int(math.dist(p, q) / 0.02)) for p, q in pairwise(corners)]
+    places = np.vstack(legs)
+    return places + np.random.default_rng(len(places)).normal(0.0, 0.005, places.shape)
+
+
+@pytest.mark.parametrize("name", ["hsl", "hide"])
+def test_past_a_door_the_wall_behind_is_not_taken_for_its_front(name: str) -> None:
+    """Of a wall of 16 cm the robot has seen one side; the other, new, would hit it: more than fits where it is."""
+    before = np.vstack(
+        (along((-3.0, -1.0), (0.0, -1.0), (0.0, -0.45), (0.16, -0.45)), along((2.5, -1.0), (5.0, -1.0)),
+         along((4.0, 0.6), (4.0, 0.9)), along((0.16, 0.45), (0.0, 0.45), (0.0, 1.0), (-3.0, 1.0)))
+    )  # fmt: skip
+    past = np.vstack(
+        (along((0.16, -0.45), (0.16, -1.0), (5.0, -1.0)), along((4.0, 0.6), (4.0, 0.9)),
+         along((3.0, 1.0), (0.16, 1.0), (0.16, 0.45)))
+    )  # fmt: skip
+    window = SearchWindow(0.25, 0.25, math.radians(10.0))
+    for parameters, found_there in (({}, True), ({"fitness": "surface"}, False)):
+        matcher = create(name, parameters)
+        reference = matcher.prepare(before)
+        for seed in range(5):
+            result = matcher.match(reference, past, np.zeros(3), window, np.random.default_rng(seed))
+            assert (np.hypot(*result.pose[:2]) < 0.02) == found_there
+
+
 @pytest.mark.parametrize("name", ["hsl", "hide"])
 def test_a_wide_window_is_searched_wider(name: str, room_pair: Pair) -> None:
     reference, scan, truth = room_pair
