@@ -29,8 +29,8 @@ class Estimate:
     diagnostics : mapping
         Anything else worth knowing; JSON types only.
     lines : float64 (N, 3), optional
-        Of the scan's points, as `hsslam.kernels.surface.scan_lines` makes them, if the method needed them: the
-        framework, which does, too, need not make them again.
+        Of the scan's points, as `hsslam.search.scan_lines` makes them, if the method needed them: the framework, which
+        does, too, need not make them again.
     """
 
     pose: Pose

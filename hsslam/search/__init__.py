@@ -2,7 +2,7 @@
 
 from hsslam.kernels.random import seed_of
 from hsslam.kernels.raster import Raster
-from hsslam.kernels.surface import Surface
+from hsslam.kernels.surface import Surface, scan_lines
 from hsslam.search.fitness import HitFitness
 from hsslam.search.fitness_functions import FitnessFunction, fitness_names, register_fitness
 from hsslam.search.genetic import genetic_search, genetic_search_all
@@ -36,5 +36,6 @@ __all__ = [
     "hide_search_all",
     "minimize",
     "register_fitness",
+    "scan_lines",
     "seed_of",
 ]

@@ -7,9 +7,8 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from hsslam.kernels.surface import scan_lines
 from hsslam.matching import Estimate, Matcher, Points, Pose, Reference, SearchWindow, clean
-from hsslam.search import PopulationConfig
+from hsslam.search import PopulationConfig, scan_lines
 from hsslam.search.exhaustive import ExhaustiveReference, lattice_search, window_search
 from hsslam.search.fitness import FitnessName
 from hsslam.search.polish import polish
