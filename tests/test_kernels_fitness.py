@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hsslam.kernels.assess import assess, degenerate_direction
+from hsslam.kernels.assess import assess, degenerate_direction, explained
 from hsslam.kernels.fitness import count_hits, count_sided, interpolate_points, scratch
 from hsslam.kernels.raster import Raster, stamp_squares
 from hsslam.kernels.surface import Surface, scan_lines
@@ -326,3 +326,14 @@ def test_clutter_does_not_open_a_direction_that_returns_fix() -> None:
     assert score > 0.9
     assert np.isnan(direction)
     assert np.sqrt(covariance[0, 0]) < 0.03
+
+
+@given(walks, clouds, poses)
+@settings(deadline=None, max_examples=40)
+def test_the_points_that_are_explained_are_those_that_the_score_counts(
+    reference: NDArray[np.float64], points: NDArray[np.float64], pose: NDArray[np.float64]
+) -> None:
+    surface, lines = Surface.build(reference), scan_lines(points)
+    told = explained(surface.pieces, surface.nearest, surface.frame, points, lines, pose, 0.1)
+    score, _, _ = assess(surface, points, pose, np.array([0.2, 0.2, 0.1]), 0.1, lines)
+    assert told.sum() == pytest.approx(score * len(points))

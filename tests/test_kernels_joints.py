@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from hsslam.kernels.joints import (
     ARM,
     ENOUGH,
+    NARROWEST,
     NEAR,
     PLENTY,
     SPACINGS,
     STRAIGHT,
     joints_of,
     usual_squared_spacing,
+    width_of,
 )
 from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, lines_of
 from hsslam.se2 import Points
@@ -61,6 +63,27 @@ def seen(degrees: float, wall: float = 1.0, length: float = 6.0) -> Points:
 @settings(deadline=None, max_examples=100)
 def test_joints_agree_with_numpy(points: Points) -> None:
     assert joints_of(points).tolist() == twin(points).tolist()
+
+
+@given(clouds, st.integers(0, 2**25 - 1))
+@settings(deadline=None, max_examples=60)
+def test_widths_agree_with_numpy(points: Points, bits: int) -> None:
+    chosen = np.array([bits >> i & 1 for i in range(len(points))], dtype=np.bool_)
+    joined = twin(points)
+    expected = 0.0
+    for i in np.flatnonzero(chosen):
+        beside = i > 0 and chosen[i - 1] and joined[i - 1]
+        expected += np.linalg.norm(points[i] - points[i - 1]) if beside else NARROWEST
+    assert width_of(points, chosen) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("degrees", [0.25, 0.5])
+def test_a_wall_is_as_wide_as_it_is_seen_and_a_lone_return_a_little(degrees: float) -> None:
+    points = seen(degrees)
+    lone = np.concatenate((points, [[0.0, -5.0]]))
+    width = width_of(points, np.ones(len(points), dtype=np.bool_))
+    assert width == pytest.approx(np.ptp(points[:, 0]) + NARROWEST, abs=0.5)
+    assert width_of(lone, np.ones(len(lone), dtype=np.bool_)) == pytest.approx(width + NARROWEST)
 
 
 @given(clouds, st.floats(-3.0, 3.0))

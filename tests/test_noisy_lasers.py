@@ -18,7 +18,7 @@ from hsslam.datasets.simulator import (
 )
 from hsslam.datasets.simulator.solids import room
 from hsslam.kernels.joints import joints_of
-from hsslam.kernels.lines import ARM, ENOUGH, LONG, MEDIAN, PLENTY, fit_line, noise_of
+from hsslam.kernels.lines import ARM, ENOUGH, LONG, MEDIAN, PLENTY, UNBENT, fit_line, noise_of
 from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, Surface
 from hsslam.se2 import Points, between_many
 from hsslam.slam.pipeline import Slam
@@ -53,21 +53,35 @@ def test_noise_is_told_from_the_returns(noise: float, spacing: float) -> None:
     assert told(wall(noise, spacing)) == pytest.approx(noise, rel=0.5)
 
 
+def from_chord(a: Points, b: Points, at: Points) -> tuple[float, float]:
+    """Where a place is along a chord, as a share of it, and how far across."""
+    chord, away = b - a, at - a
+    length = float(np.linalg.norm(chord))
+    return float(away @ chord) / length**2, float(away[0] * chord[1] - away[1] * chord[0]) / length
+
+
 def noise_twin(points: Points, arm: float) -> float:
-    """By NumPy: median distance from chords to the first returns ``arm`` away on either side of an unbroken surface."""
-    found = []
+    """By NumPy: distances from chords to the first returns ``arm`` away on either side of an unbroken surface."""
+    found, unbent = [], []
     for i in range(1, len(points) - 1, 1 + len(points) // PLENTY):
         away = np.linalg.norm(points - points[i], axis=1) > arm
         before, after = np.flatnonzero(away[:i]), np.flatnonzero(away[i:])
-        a, b = points[before[-1] if len(before) else 0], points[i + after[0] if len(after) else -1]
-        length = np.linalg.norm(b - a)
-        if length < arm:
+        first, last = before[-1] if len(before) else 0, i + after[0] if len(after) else len(points) - 1
+        a, b = points[first], points[last]
+        t, off = from_chord(a, b, points[i])
+        if np.linalg.norm(b - a) < arm or not 0.1 < t < 0.9:
             continue
-        t = (points[i] - a) @ (b - a) / length**2
-        if 0.1 < t < 0.9:
-            across = abs((points[i] - a) @ np.array([a[1] - b[1], b[0] - a[0]])) / length
-            found.append(across / math.sqrt(1.0 + t * t + (1.0 - t) * (1.0 - t)))
-    return float(np.median(found)) / MEDIAN if len(found) >= ENOUGH else 0.0
+        found.append(abs(off) / np.linalg.norm([1.0, 1.0 - t, t]))
+        unbent.append(found[-1])
+        other = (i + last) // 2 if last - i >= i - first else (first + i) // 2
+        s, beside = from_chord(a, b, points[other])
+        if other not in (i, first) and 0.1 < s < 0.9:
+            share = t * (1.0 - t) / (s * (1.0 - s))
+            spread = np.linalg.norm([1.0, share, 1.0 - t - share * (1.0 - s), t - share * s])
+            unbent[-1] = abs(off - share * beside) / spread
+    if len(found) < ENOUGH:
+        return 0.0
+    return float(min(np.median(found), UNBENT * np.median(unbent))) / MEDIAN
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.005, 0.02, 0.05])

@@ -182,3 +182,27 @@ def test_an_answer_near_odometry_has_to_stand_at_a_bottom(rests: bool) -> None:
         expected
     )
     assert found.pose == pytest.approx(matcher.on_the_way if rests else matcher.leapt)
+
+
+@pytest.mark.parametrize("width", [0.5, 3.0], ids=["of a person", "of a wall"])
+def test_what_is_as_narrow_as_people_does_not_deny_odometry(width: float) -> None:
+    """A wall along the way fits either way; half of the returns are of something that stayed beside the robot."""
+    matcher = Drawn()
+    matcher.leapt, matcher.on_the_way = pose(-0.2, 0.0, 0.0), pose(0.001, 0.0, 0.0)
+    wall = np.column_stack((np.arange(-3.0, 3.0, 0.05), np.full(120, 2.0)))
+    beside = np.column_stack((np.full(120, 1.5), np.linspace(-width, 0.0, 120)))
+    expected = Expectation(
+        pose=np.zeros(3),
+        covariance=np.diag([0.01, 0.01, 0.01]) ** 2,
+        repeated=np.zeros(3),
+        told=True,
+        leaps=False,
+        score=0.9,
+    )
+    points = np.concatenate((wall, beside))
+    known = np.concatenate((wall + [-4.0, 0.0], wall, transform(matcher.leapt, beside)))
+    submap = GrowingSubmap(matcher, known, np.zeros(3))
+    found = Locator(TrackerSection(), matcher, submap, points, np.random.default_rng(0), Stopwatch()).locate(
+        expected
+    )
+    assert found.pose == pytest.approx(matcher.on_the_way if width < 1.0 else matcher.leapt)

@@ -152,6 +152,38 @@ def degenerate_direction(covariance: NDArray[np.float64], half: NDArray[np.float
 
 
 @kernel
+def lies_on(
+    pieces: NDArray[np.float64], k: int, x: float, y: float, nx: float, ny: float, distance: float
+) -> bool:
+    """Whether a point is within ``distance`` (m) of a segment, and of its side: its line's normal is ``(nx, ny)``."""
+    if squared_distance(pieces, k, x, y) > distance * distance:
+        return False
+    return bool(pieces[k, 5] * nx + pieces[k, 6] * ny >= -LEAST_AGREEMENT)
+
+
+@kernel
+def explained(
+    pieces: NDArray[np.float64],
+    nearest: NDArray[np.uint32],
+    frame: NDArray[np.float64],
+    points: Points,
+    lines: NDArray[np.float64],
+    pose: Pose,
+    distance: float,
+) -> NDArray[np.bool_]:
+    """Which of the points count for the score that `measure` gives, (N,)."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    out = np.zeros(points.shape[0], dtype=np.bool_)
+    for i in range(points.shape[0]):
+        x = pose[0] + c * points[i, 0] - s * points[i, 1]
+        y = pose[1] + s * points[i, 0] + c * points[i, 1]
+        k = nearest_segment(nearest, frame, x, y)
+        nx, ny = c * lines[i, 0] - s * lines[i, 1], s * lines[i, 0] + c * lines[i, 1]
+        out[i] = k >= 0 and lies_on(pieces, k, x, y, nx, ny, distance)
+    return out
+
+
+@kernel
 def gather(
     pieces: NDArray[np.float64],
     tilts: NDArray[np.float64],
@@ -191,14 +223,10 @@ def gather(
         ry = s * points[i, 0] + c * points[i, 1]
         x, y = x0 + rx, y0 + ry
         k = nearest_segment(nearest, frame, x, y)
-        if k < 0 or squared_distance(pieces, k, x, y) > distance * distance:
+        nx, ny = c * lines[i, 0] - s * lines[i, 1], s * lines[i, 0] + c * lines[i, 1]
+        if k < 0 or not lies_on(pieces, k, x, y, nx, ny, distance):
             continue
         nx, ny = pieces[k, 5], pieces[k, 6]
-        if (
-            nx * (c * lines[i, 0] - s * lines[i, 1]) + ny * (s * lines[i, 0] + c * lines[i, 1])
-            < -LEAST_AGREEMENT
-        ):
-            continue
         matched += 1
         residual = nx * x + ny * y - pieces[k, 7]
         counts[min(int(abs(residual) / distance * BINS), BINS - 1)] += 1

@@ -1,4 +1,4 @@
-"""Which neighbouring returns of a scan are of the same surface."""
+"""Which neighbouring returns of a scan are of the same surface, and how wide what they are of is."""
 
 from __future__ import annotations
 
@@ -22,6 +22,9 @@ PLENTY = 60
 
 STRAIGHT = 0.15
 """Tangent of the angle by which a surface may turn on its way across such a gap."""
+
+NARROWEST = 0.1
+"""Width of a thing of which there is a single return (m)."""
 
 ARM = 0.2
 """Length of the piece of surface that leads across, over the gap's, at least."""
@@ -54,6 +57,22 @@ def joints_of(points: Points) -> NDArray[np.bool_]:
                 i + 2 < n and _leads_on(points, i + 2, i + 1, -dx, -dy)
             )
     return joined
+
+
+@kernel
+def width_of(points: Points, chosen: NDArray[np.bool_]) -> float:
+    """How wide the things are together that the chosen ones of a scan's points (N, 2) are of (m)."""
+    joined = joints_of(points)
+    width = 0.0
+    for i in range(points.shape[0]):
+        if not chosen[i]:
+            continue
+        if i > 0 and chosen[i - 1] and joined[i - 1]:
+            dx, dy = points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1]
+            width += np.sqrt(dx * dx + dy * dy)
+        else:
+            width += NARROWEST
+    return width
 
 
 @kernel

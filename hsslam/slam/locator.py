@@ -7,9 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hsslam.config import TrackerSection
-from hsslam.kernels.assess import assess
+from hsslam.kernels.assess import assess, explained
+from hsslam.kernels.joints import width_of
 from hsslam.kernels.surface import scan_lines
 from hsslam.matching.interface import MINIMUM_POINTS, Matcher, SearchWindow
 from hsslam.matching.results import MatchResult
@@ -54,6 +56,9 @@ FEW = 6
 
 FARTHER = 7.0
 """How many times the first answer's standard deviation an answer at a bottom of its own may have."""
+
+WIDEST = 2.0
+"""People around the robot are no wider together than this (m)."""
 
 AT_REST = 0.01
 """Standard deviation (m, rad) that any answer may have."""
@@ -210,6 +215,9 @@ class Locator:
 
     def _agree(self, expected: Expectation, first: MatchResult) -> MatchResult:
         """Search only where odometry may be right: what fits about as well there is likelier than what denies it."""
+        if not expected.leaps and expected.contradicts(first) and self._without_movers(expected, first):
+            near = self._match(expected.pose, expected.window(AGREEING, self._window))
+            return self._known_within(self._window, near) if near.converged else near
         near = self._match(expected.pose, expected.window(AGREEING, self._window))
         fit, usual = self._fit(near), self._fit(first)
         if not near.converged or fit <= usual - expected.least_gain(first.pose):
@@ -220,6 +228,29 @@ class Locator:
             return first if fit <= usual else self._settled(near)
         # What so narrow a window adds to the covariance is odometry's, and odometry is weighed by itself.
         return self._known_within(self._window, near)
+
+    def _without_movers(self, expected: Expectation, first: MatchResult) -> bool:
+        """Leave out the returns that alone speak for an answer that denies odometry, if they may be of people."""
+        here, there = (self._explained(pose) for pose in (expected.pose, first.pose))
+        movers = there & ~here
+        if not movers.any() or width_of(self._points, movers) > WIDEST:
+            return False
+        self._points = self._points[~movers]
+        return True
+
+    def _explained(self, pose: Pose) -> NDArray[np.bool_]:
+        """Which returns count for the score, the robot being at ``pose``."""
+        surface = self._reference.surface
+        distance = self._matcher.config.score_distance
+        return explained(
+            surface.pieces,
+            surface.nearest,
+            surface.frame,
+            self._points,
+            scan_lines(self._points),
+            pose,
+            distance,
+        )
 
     def _steadier(self, expected: Expectation, first: MatchResult) -> MatchResult:
         """Where odometry leaps or is late, try the last motion once more: that may reach further than any window."""

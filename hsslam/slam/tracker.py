@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import Config
+from hsslam.kernels.joints import width_of
 from hsslam.matching.interface import Matcher
 from hsslam.scan import LaserScan
 from hsslam.se2 import Points, Pose, Poses, between, compose
@@ -34,6 +35,9 @@ RETURNS_OF_THE_LOST = 30
 
 LEAST_EXTENT = 1.0
 """Returns within a box of this diagonal (m) do not contradict odometry: a piece of one surface looks like any other."""
+
+LEAST_WIDTH = 5.0
+"""Nor do things that are no wider together than this (m), where odometry is steady: people, trees, bushes."""
 
 ANYWHERE = np.diag([20.0**2, 20.0**2, 1.0])
 """Covariance (m^2, rad^2) of a motion of which nothing is known."""
@@ -208,6 +212,8 @@ class Tracker:
         matched = result.converged and result.score >= rules.min_score and explained >= least
         if matched and expected.contradicts(result):
             matched = float(np.hypot(*np.ptp(points, axis=0))) >= LEAST_EXTENT
+            if told and not expected.leaps:
+                matched &= width_of(points, np.ones(len(points), dtype=np.bool_)) >= LEAST_WIDTH
         if not matched:
             pose, covariance = predicted, prior
         elif rules.fuse_odometry:
