@@ -133,7 +133,7 @@ class Locator:
                 found = self._steadier(expected, found)
         if self._open_direction(found) is not None:
             found = self._left_open(expected, found)
-        if expected.told and found.score < expected.score - UNFIT and expected.contradicts(found):
+        if expected.told and expected.contradicts(found) and self._unfit(found, expected):
             found = _unsure(found, expected)
         if found.evaluations == self._evaluations:
             return found
@@ -170,6 +170,10 @@ class Locator:
         if not (result.converged and self._told):
             return True
         return result.score < self._rules.recovery_score * (1.0 - self._new(result.pose))
+
+    def _unfit(self, result: MatchResult, expected: Expectation) -> bool:
+        """Whether an answer fits badly for what there is to be known: a robot that turns into a room sees much anew."""
+        return result.score < (expected.score - UNFIT) * (1.0 - self._new(result.pose))
 
     def _drawn_back(self, expected: Expectation) -> bool:
         """Whether a scan sees much for the first time along a corridor: what overlaps most seems to fit best."""
