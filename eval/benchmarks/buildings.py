@@ -1,11 +1,12 @@
-"""SLAM in random buildings: how good it is where nobody tuned it, and what it loses.
+"""SLAM in random buildings, or outdoors: how good it is where nobody tuned it, and what it loses.
 
     python eval/benchmarks/buildings.py --first 0 --count 40 [--workers 2] [--json FILE] [--set KEY=VALUE ...]
-        [--carried]
+        [--carried] [--outdoors]
 
-A row per world of `random_buildings`: RMS of the absolute error at the end and while driving (m), accepted loops and
-how many of them are false (off by more than 0.3 m), sessions that are not tied together at the end, scans per second.
-Below them the geometric mean and the worst. `--carried`: the recording pauses in the middle, and the robot is carried.
+A row per world of `random_buildings` or `random_grounds`: RMS of the absolute error at the end and while driving (m),
+accepted loops and how many of them are false (off by more than 0.3 m), sessions that are not tied together at the end,
+scans per second. Below them the geometric mean and the worst. `--carried`: the recording pauses in the middle, and the
+robot is carried. `--outdoors`: campuses, parks and car parks.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import Any
 
 import numpy as np
 from random_buildings import carried, world
+from random_grounds import grounds
 
 from hsslam.config import load_config
 from hsslam.se2 import between
@@ -32,9 +34,9 @@ FALSE = 0.3
 """A loop off by more than this (m) is false."""
 
 
-def drive(number: int, settings: list[str], pausing: bool = False) -> dict[str, Any]:
+def drive(number: int, settings: list[str], pausing: bool = False, outdoors: bool = False) -> dict[str, Any]:
     """One world, driven through and finished."""
-    chosen = world(number)
+    chosen = grounds(number) if outdoors else world(number)
     scans = list(chosen.scans())
     if pausing:
         scans = carried(scans)
@@ -69,6 +71,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=40, help="how many worlds")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--carried", action="store_true")
+    parser.add_argument("--outdoors", action="store_true")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE")
     arguments = parser.parse_args()
@@ -76,7 +79,9 @@ def main() -> None:
     rows = []
     print(" final m  online m   loops false  sessions  scans/s  world")
     with ProcessPoolExecutor(arguments.workers) as pool:
-        job = partial(drive, settings=arguments.settings, pausing=arguments.carried)
+        job = partial(
+            drive, settings=arguments.settings, pausing=arguments.carried, outdoors=arguments.outdoors
+        )
         for row in pool.map(job, numbers):
             rows.append(row)
             print(

@@ -79,13 +79,13 @@ class World:
     def scans(self) -> Iterator[LaserScan]:
         """The drive, scan by scan."""
         rng = np.random.default_rng([self.number, 1])
-        odometry = _troubled(self.dataset.odometry, self.trouble, rng)
-        people = _people(self.dataset.poses, self.crossing, self.along, rng)
+        odometry = troubled(self.dataset.odometry, self.trouble, rng)
+        people = people_around(self.dataset.poses, self.crossing, self.along, rng)
         for scan in self.dataset.scans():
             ranges = scan.ranges.copy()
             laser = compose(self.dataset.poses[scan.index], scan.laser_pose)
             for person in people[scan.index]:
-                _stand(ranges, scan, laser, person, rng)
+                stand(ranges, scan, laser, person, rng)
             yield replace(scan, ranges=ranges, odometry=odometry[scan.index].copy())
 
 
@@ -261,7 +261,7 @@ def _furniture(
     return out
 
 
-def _troubled(odometry: Poses, trouble: str, rng: np.random.Generator) -> Poses:
+def troubled(odometry: Poses, trouble: str, rng: np.random.Generator) -> Poses:
     """Odometry after what befell it."""
     if trouble == "none":
         return np.zeros_like(odometry)
@@ -280,7 +280,7 @@ def _troubled(odometry: Poses, trouble: str, rng: np.random.Generator) -> Poses:
     return out
 
 
-def _people(poses: Poses, crossing: int, along: int, rng: np.random.Generator) -> NDArray[np.float64]:
+def people_around(poses: Poses, crossing: int, along: int, rng: np.random.Generator) -> NDArray[np.float64]:
     """Where people stand at every scan, (S, P, 2) m."""
     out = np.empty((len(poses), crossing + along, 2))
     for p in range(crossing):
@@ -304,7 +304,7 @@ def _people(poses: Poses, crossing: int, along: int, rng: np.random.Generator) -
     return out
 
 
-def _stand(
+def stand(
     ranges: NDArray[np.float64],
     scan: LaserScan,
     laser: NDArray[np.float64],
