@@ -20,7 +20,7 @@ from hsslam.kernels.joints import (
     STRAIGHT,
     joints_of,
     usual_squared_spacing,
-    width_of,
+    widths_of,
 )
 from hsslam.kernels.surface import FIT_ROUGHNESS, FIT_SPAN, lines_of
 from hsslam.se2 import Points
@@ -70,20 +70,24 @@ def test_joints_agree_with_numpy(points: Points) -> None:
 def test_widths_agree_with_numpy(points: Points, bits: int) -> None:
     chosen = np.array([bits >> i & 1 for i in range(len(points))], dtype=np.bool_)
     joined = twin(points)
-    expected = 0.0
+    things: list[float] = []
     for i in np.flatnonzero(chosen):
-        beside = i > 0 and chosen[i - 1] and joined[i - 1]
-        expected += np.linalg.norm(points[i] - points[i - 1]) if beside else NARROWEST
-    assert width_of(points, chosen) == pytest.approx(expected, abs=1e-9)
+        if i > 0 and chosen[i - 1] and joined[i - 1]:
+            things[-1] += float(np.linalg.norm(points[i] - points[i - 1]))
+        else:
+            things.append(NARROWEST)
+    together, widest = widths_of(points, chosen)
+    assert together == pytest.approx(sum(things), abs=1e-9)
+    assert widest == pytest.approx(max(things, default=0.0), abs=1e-9)
 
 
 @pytest.mark.parametrize("degrees", [0.25, 0.5])
 def test_a_wall_is_as_wide_as_it_is_seen_and_a_lone_return_a_little(degrees: float) -> None:
     points = seen(degrees)
     lone = np.concatenate((points, [[0.0, -5.0]]))
-    width = width_of(points, np.ones(len(points), dtype=np.bool_))
-    assert width == pytest.approx(np.ptp(points[:, 0]) + NARROWEST, abs=0.5)
-    assert width_of(lone, np.ones(len(lone), dtype=np.bool_)) == pytest.approx(width + NARROWEST)
+    together, widest = widths_of(lone, np.ones(len(lone), dtype=np.bool_))
+    assert widest == pytest.approx(np.ptp(points[:, 0]) + NARROWEST)
+    assert together == pytest.approx(widest + NARROWEST)
 
 
 @given(clouds, st.floats(-3.0, 3.0))

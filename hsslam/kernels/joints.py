@@ -60,19 +60,22 @@ def joints_of(points: Points) -> NDArray[np.bool_]:
 
 
 @kernel
-def width_of(points: Points, chosen: NDArray[np.bool_]) -> float:
-    """How wide the things are together that the chosen ones of a scan's points (N, 2) are of (m)."""
+def widths_of(points: Points, chosen: NDArray[np.bool_]) -> tuple[float, float]:
+    """How wide the things are that chosen ones of a scan's points (N, 2) are of: all together, and the widest (m)."""
     joined = joints_of(points)
-    width = 0.0
+    together = here = widest = 0.0
     for i in range(points.shape[0]):
         if not chosen[i]:
             continue
         if i > 0 and chosen[i - 1] and joined[i - 1]:
             dx, dy = points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1]
-            width += np.sqrt(dx * dx + dy * dy)
+            step = np.sqrt(dx * dx + dy * dy)
+            here += step
         else:
-            width += NARROWEST
-    return width
+            here = step = NARROWEST
+        together += step
+        widest = max(widest, here)
+    return together, widest
 
 
 @kernel

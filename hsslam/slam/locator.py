@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hsslam.config import TrackerSection
 from hsslam.kernels.assess import assess, explained
-from hsslam.kernels.joints import width_of
+from hsslam.kernels.joints import widths_of
 from hsslam.kernels.surface import scan_lines
 from hsslam.matching.interface import MINIMUM_POINTS, Matcher, SearchWindow
 from hsslam.matching.results import MatchResult
@@ -104,6 +104,11 @@ class Locator:
         self._evaluations = 0
         self._enough = 1.0
         self._told = False
+
+    @property
+    def returns(self) -> int:
+        """How many returns the answer's score is a share of: those of people are left out."""
+        return len(self._points)
 
     def locate(self, expected: Expectation) -> MatchResult:
         """The best answer, whose ``evaluations`` are those of all matches that it took."""
@@ -237,7 +242,7 @@ class Locator:
         """Leave out the returns that alone speak for an answer that denies odometry, if they may be of people."""
         here, there = (self._explained(pose) for pose in (expected.pose, first.pose))
         movers = there & ~here
-        if not movers.any() or width_of(self._points, movers) > WIDEST:
+        if not movers.any() or widths_of(self._points, movers)[0] > WIDEST:
             return False
         self._points = self._points[~movers]
         return True

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsslam.config import Config
-from hsslam.kernels.joints import width_of
+from hsslam.kernels.joints import widths_of
 from hsslam.matching.interface import Matcher
 from hsslam.scan import LaserScan
 from hsslam.se2 import Points, Pose, Poses, between, compose
@@ -36,8 +36,8 @@ RETURNS_OF_THE_LOST = 30
 LEAST_EXTENT = 1.0
 """Returns within a box of this diagonal (m) do not contradict odometry: a piece of one surface looks like any other."""
 
-LEAST_WIDTH = 5.0
-"""Nor do things that are no wider together than this (m), where odometry is steady: people, trees, bushes."""
+LEAST_WIDTHS = (5.0, 3.0)
+"""Nor do things that are no wider than this (m), together and each, where odometry is steady: people, trees, bushes."""
 
 ANYWHERE = np.diag([20.0**2, 20.0**2, 1.0])
 """Covariance (m^2, rad^2) of a motion of which nothing is known."""
@@ -204,16 +204,16 @@ class Tracker:
             paused=paused,
         )
         rng = generator(self._config.seed, Purpose.TRACK, scan.index)
-        result = Locator(rules, self._matcher, self._submap.current, points, rng, self._stopwatch).locate(
-            expected
-        )
-        explained = result.score * len(points)
+        locator = Locator(rules, self._matcher, self._submap.current, points, rng, self._stopwatch)
+        result = locator.locate(expected)
+        explained = result.score * locator.returns
         least = RETURNS_OF_THE_LOST if self._motion.lost else LEAST_RETURNS
         matched = result.converged and result.score >= rules.min_score and explained >= least
         if matched and expected.contradicts(result):
             matched = float(np.hypot(*np.ptp(points, axis=0))) >= LEAST_EXTENT
             if told and not expected.leaps:
-                matched &= width_of(points, np.ones(len(points), dtype=np.bool_)) >= LEAST_WIDTH
+                together, widest = widths_of(points, np.ones(len(points), dtype=np.bool_))
+                matched &= together >= LEAST_WIDTHS[0] or widest >= LEAST_WIDTHS[1]
         if not matched:
             pose, covariance = predicted, prior
         elif rules.fuse_odometry:
