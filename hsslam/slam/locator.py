@@ -105,11 +105,6 @@ class Locator:
         self._enough = 1.0
         self._told = False
 
-    @property
-    def returns(self) -> int:
-        """How many returns the answer's score is a share of: those of people are left out."""
-        return len(self._points)
-
     def locate(self, expected: Expectation) -> MatchResult:
         """The best answer, whose ``evaluations`` are those of all matches that it took."""
         # A robot that turns far between two scans may have turned farther than the usual window reaches.

@@ -204,9 +204,10 @@ class Tracker:
             paused=paused,
         )
         rng = generator(self._config.seed, Purpose.TRACK, scan.index)
-        locator = Locator(rules, self._matcher, self._submap.current, points, rng, self._stopwatch)
-        result = locator.locate(expected)
-        explained = result.score * locator.returns
+        result = Locator(rules, self._matcher, self._submap.current, points, rng, self._stopwatch).locate(
+            expected
+        )
+        explained = result.score * len(points)
         least = RETURNS_OF_THE_LOST if self._motion.lost else LEAST_RETURNS
         matched = result.converged and result.score >= rules.min_score and explained >= least
         if matched and expected.contradicts(result):
