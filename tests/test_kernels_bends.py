@@ -35,9 +35,8 @@ def test_lines_of_a_pillar_are_its_tangents(radius: float) -> None:
     outward = middles / np.linalg.norm(middles, axis=1)[:, None]
     turned = np.abs(outward[:, 0] * lines[:, 1] - outward[:, 1] * lines[:, 0])
     assert turned[1:-1].max() < 0.01
-    assert (
-        turned.max() < 0.15
-    )  # half a stretch of surface, at the end of which there is too little of it to tell
+    # At its ends there may be too little of the surface to tell of a bend.
+    assert turned.max() < 0.15
     # Tangents of a circle are a radius from its middle.
     assert np.abs(lines[:, 2]) == pytest.approx(np.full(len(lines), radius), abs=0.0015)
 

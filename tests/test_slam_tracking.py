@@ -177,7 +177,7 @@ def test_a_robot_in_a_bare_corridor_goes_where_odometry_leaps_to() -> None:
     walls = np.array([[-60.0, -1.2, 60.0, -1.2], [-60.0, 1.2, 60.0, 1.2]])
     geometry = ScanGeometry(-math.pi / 2, math.radians(1.0), range_max=12.0)
     off = []
-    for seed in range(6):
+    for seed in range(24):
         rng = np.random.default_rng(seed)
         slam = Slam(load_config(overrides=[f"seed={seed}"]))
         for i in range(12):
@@ -186,7 +186,9 @@ def test_a_robot_in_a_bare_corridor_goes_where_odometry_leaps_to() -> None:
             (event, *_) = slam.process(LaserScan(float(i), ranges, geometry, odometry, index=i))
             assert isinstance(event, Tracked)
         off.append(event.pose[0] - odometry[0])
-    assert np.sqrt(np.mean(np.square(off))) < 0.12
+    # Four seeds happened to end within 10 cm each; of these 24 it was seven that did not, and 8.3 cm in all.
+    assert np.sqrt(np.mean(np.square(off))) < 0.08
+    assert np.abs(off).max() < 0.2
 
 
 @pytest.mark.parametrize("turn", [-100.0, -90.0, 80.0, 95.0])
@@ -255,8 +257,8 @@ def test_few_returns_fit_anywhere_and_odometry_stands_in(returns: int) -> None:
     assert event.relative == pytest.approx(moved)
 
 
-@pytest.mark.parametrize(("extent", "believed"), [(0.8, False), (4.0, True)])
-def test_a_piece_of_one_surface_does_not_contradict_odometry(extent: float, believed: bool) -> None:
+@pytest.mark.parametrize(("extent", "matched"), [(0.8, False), (4.0, True)])
+def test_a_piece_of_one_surface_does_not_contradict_odometry(extent: float, matched: bool) -> None:
     """It looks like many another: here it would have the robot 30 cm and 15 degrees from where odometry does."""
     slam = Slam(load_config())
     slam.process(room_scan_at(np.zeros(3), beams=361, noise=0.005))
@@ -268,8 +270,8 @@ def test_a_piece_of_one_surface_does_not_contradict_odometry(extent: float, beli
     told = pose(0.02, 0.0, 0.0)
     (event, *_) = slam.process(replace(second, index=1, ranges=ranges, odometry=told))
     assert isinstance(event, Tracked)
-    assert event.matched or not believed
-    assert event.relative == pytest.approx(moved if believed else told, abs=0.02)
+    assert event.matched is matched
+    assert event.relative == pytest.approx(moved if matched else told, abs=0.02)
 
 
 def test_a_laser_that_sees_no_end_of_a_corridor_follows_odometry() -> None:

@@ -57,6 +57,9 @@ FEW = 6
 FARTHER = 7.0
 """How many times the first answer's standard deviation an answer at a bottom of its own may have."""
 
+LEAST_EXTENT = 1.0
+"""Returns within a box of this diagonal (m) do not contradict odometry: a piece of one surface looks like any other."""
+
 WIDEST = 2.0
 """People around the robot are no wider together than this (m)."""
 
@@ -234,10 +237,13 @@ class Locator:
         return self._known_within(self._window, near)
 
     def _without_movers(self, expected: Expectation, first: MatchResult) -> bool:
-        """Leave out the returns that alone speak for an answer that denies odometry, if they may be of people."""
+        """Leave out the returns that alone speak for an answer that denies odometry, if they may be of people.
+
+        Not if no more than a piece of one surface were left.
+        """
         here, there = (self._explained(pose) for pose in (expected.pose, first.pose))
         movers = there & ~here
-        if not movers.any() or widths_of(self._points, movers)[0] > WIDEST:
+        if not movers.any() or widths_of(self._points, movers)[0] > WIDEST or is_piece(self._points[~movers]):
             return False
         self._points = self._points[~movers]
         return True
@@ -315,6 +321,11 @@ class Locator:
             if not at_edge(moved, self._window):
                 break
         return found
+
+
+def is_piece(points: Points) -> bool:
+    """Whether (N, 2) returns are no more than a piece of one surface, see `LEAST_EXTENT`; none are not even that."""
+    return len(points) == 0 or float(np.hypot(*np.ptp(points, axis=0))) < LEAST_EXTENT
 
 
 def _cut_off(

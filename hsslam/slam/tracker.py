@@ -17,7 +17,7 @@ from hsslam.scan import LaserScan
 from hsslam.se2 import Points, Pose, Poses, between, compose
 from hsslam.slam.expectation import Expectation
 from hsslam.slam.fusion import fuse, rotated
-from hsslam.slam.locator import UNFIT, Locator
+from hsslam.slam.locator import UNFIT, Locator, is_piece
 from hsslam.slam.motion import MotionModel
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.sessions import Pause
@@ -33,11 +33,8 @@ LEAST_RETURNS = 10
 RETURNS_OF_THE_LOST = 30
 """So many where the robot may be anywhere around, not near odometry's prediction alone."""
 
-LEAST_EXTENT = 1.0
-"""Returns within a box of this diagonal (m) do not contradict odometry: a piece of one surface looks like any other."""
-
 LEAST_WIDTHS = (5.0, 3.0)
-"""Nor do things that are no wider than this (m), together and each, where odometry is steady: people, trees, bushes."""
+"""Things no wider than this (m), together and each, do not contradict steady odometry: people, trees, bushes."""
 
 ANYWHERE = np.diag([20.0**2, 20.0**2, 1.0])
 """Covariance (m^2, rad^2) of a motion of which nothing is known."""
@@ -211,7 +208,7 @@ class Tracker:
         least = RETURNS_OF_THE_LOST if self._motion.lost else LEAST_RETURNS
         matched = result.converged and result.score >= rules.min_score and explained >= least
         if matched and expected.contradicts(result):
-            matched = float(np.hypot(*np.ptp(points, axis=0))) >= LEAST_EXTENT
+            matched = not is_piece(points)
             if told and not expected.leaps:
                 together, widest = widths_of(points, np.ones(len(points), dtype=np.bool_))
                 matched &= together >= LEAST_WIDTHS[0] or widest >= LEAST_WIDTHS[1]
