@@ -48,6 +48,7 @@ def test_tangents_agree_with_numpy(radius: float, turn: float) -> None:
     c, s = math.cos(turn), math.sin(turn)
     points = arc(radius, 0.0005) @ np.array([[c, s], [-s, c]])
     line, joined = np.empty(6), joints_of(points)
+    bent = 0
     for i in range(0, len(points) - 1, 5):
         fit_line(points, i, joined, FIT_SPAN, FIT_ROUGHNESS, 0.0005, line)
         middle = 0.5 * (points[i] + points[i + 1])
@@ -62,6 +63,7 @@ def test_tangents_agree_with_numpy(radius: float, turn: float) -> None:
         left = float(found[0]) / (len(near) - 3)
         if straight - float(found[0]) <= BENT**2 * max(0.0005**2, left):
             continue
+        bent += 1
         at = float((middle - mean) @ along)
         slope = float(np.polyval(np.polyder(parabola), at))
         tangent = (along + slope * across) / math.hypot(1.0, slope)
@@ -71,6 +73,7 @@ def test_tangents_agree_with_numpy(radius: float, turn: float) -> None:
         gradient = np.array([2.0 * at, 1.0, 0.0])
         assert line[4] == pytest.approx(gradient @ np.linalg.inv(design.T @ design) @ gradient, rel=1e-6)
         assert line[5] == pytest.approx(left, rel=1e-6)
+    assert bent >= 10
 
 
 @pytest.mark.parametrize("noise", [0.001, 0.01])
