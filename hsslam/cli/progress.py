@@ -184,11 +184,22 @@ def progress(quiet: bool = False) -> Iterator[Progress]:
 
 
 @contextmanager
-def watch_compiler(shown: Progress) -> Iterator[None]:
-    """Tell ``shown`` when numba compiles while the block runs: kernels come from its cache after the first run."""
-    from hsslam import jit
+def watch_compiler(shown: Progress, ahead: bool = False) -> Iterator[None]:
+    """Tell ``shown`` when numba compiles while the block runs: kernels come from its cache after the first run.
 
-    with jit.watch_compiler(shown.compiling):
+    With ``ahead`` all kernels of a run are compiled, side by side, when the first of them is to be.
+    """
+    from hsslam import jit
+    from hsslam.ahead import KERNELS, compile_ahead
+
+    waiting = set(KERNELS) if ahead else set()
+
+    def before(name: str) -> None:
+        if name in waiting:
+            waiting.clear()
+            compile_ahead()
+
+    with jit.watch_compiler(shown.compiling, before):
         yield
 
 

@@ -37,7 +37,7 @@ def run_log(
     title = f"{log.info.name}, {config.matcher.name}"
     total = log.info.scan_count or header.dataset["scans"] or _count(log, shown)
     wall, cpu = time.perf_counter(), time.process_time()
-    with watch_compiler(shown), folder.begin(header, config) as journal:
+    with watch_compiler(shown, ahead=True), folder.begin(header, config) as journal:
         slam = Slam(config, replay=folder.replay)
         recording = folder.path / RECORDING
         loops = 0

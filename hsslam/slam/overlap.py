@@ -39,20 +39,26 @@ def overlapping_pairs(
     to a place are tied together. Consecutive keyframes are no pair: they have a constraint.
     """
     one = np.zeros(len(poses), dtype=np.int64) if sessions is None else sessions
-    pairs = nearest_apart(poses, one, radius, neighbours, SPREAD)
+    by_x = np.argsort(poses[:, 0], kind="stable")
+    pairs = nearest_apart(poses, by_x, one, radius, neighbours, SPREAD)
     return sorted(zip(pairs[:, 0].tolist(), pairs[:, 1].tolist(), strict=True))
 
 
 @kernel
 def nearest_apart(
-    poses: Poses, sessions: NDArray[np.int64], radius: float, most: int, spread: int
+    poses: Poses,
+    by_x: NDArray[np.int64],
+    sessions: NDArray[np.int64],
+    radius: float,
+    most: int,
+    spread: int,
 ) -> NDArray[np.int64]:
     """Pairs (P, 2), in the order of their second: ``most`` of each at most, no two firsts of it nearer than ``spread``.
 
-    One second at a time: of a place that was visited n times there are n squared pairs, too many to hold.
+    ``by_x`` tells the order of the poses by x. One second at a time: of a place that was visited n times there are
+    n squared pairs, too many to hold.
     """
     count = poses.shape[0]
-    by_x = np.argsort(poses[:, 0])
     sorted_x = poses[by_x, 0]
     pairs = np.empty((count * most, 2), dtype=np.int64)
     found = 0
