@@ -14,7 +14,7 @@ from hsslam.config import Config, GraphSection, load_config
 from hsslam.datasets.simulator import SimulatedDataset
 from hsslam.scan import LaserScan, ScanGeometry
 from hsslam.se2 import between_many, compose, pose
-from hsslam.slam.motion import REST_STD_THETA, REST_STD_XY, UNSTEADY, MotionModel
+from hsslam.slam.motion import REST_STD_THETA, REST_STD_XY, UNSTEADY, Evidence, MotionModel
 from hsslam.slam.pipeline import Slam
 
 RULES = GraphSection()
@@ -29,7 +29,7 @@ def silent_model(step: NDArray[np.float64], seconds: float = 0.25) -> MotionMode
     model = MotionModel(RULES)
     model.start(scan(0.0, np.zeros(3)))
     for i in range(1, 4):
-        model.observe(scan(i * seconds, np.zeros(3)), step, matched=True)
+        model.observe(scan(i * seconds, np.zeros(3)), step, Evidence(True))
     return model
 
 
@@ -45,7 +45,7 @@ def test_odometry_is_the_prediction_in_the_frame_of_the_last_scan() -> None:
     assert covariance[0, 0] == pytest.approx(usual + (UNSTEADY * math.hypot(0.4, 0.1)) ** 2)
     assert np.linalg.eigvalsh(covariance)[0] > 0.0
     going = compose(start, step)
-    model.observe(scan(0.1, going), step, matched=True)
+    model.observe(scan(0.1, going), step, Evidence(True))
     _, steady = model.predict(scan(0.2, compose(going, step)))
     assert steady[0, 0] == pytest.approx(usual)
     _, late = model.predict(scan(0.2, going))
@@ -67,7 +67,7 @@ def test_the_last_motion_stands_in_until_odometry_speaks_again() -> None:
     moved, covariance = model.predict(scan(1.0, np.zeros(3)))
     assert moved == pytest.approx(step)
     assert covariance[0, 0] > model.covariance(step)[0, 0]
-    model.observe(scan(1.0, pose(0.1, 0.0, 0.0)), step, matched=True)
+    model.observe(scan(1.0, pose(0.1, 0.0, 0.0)), step, Evidence(True))
     assert not model.silent
     again, _ = model.predict(scan(1.25, pose(0.3, 0.0, 0.0)))
     assert again == pytest.approx(pose(0.2, 0.0, 0.0))
@@ -88,7 +88,7 @@ def test_nobody_goes_on_for_ever_without_being_seen() -> None:
     for i in range(200):
         unseen = scan(1.0 + 0.25 * i, np.zeros(3))
         moved, _ = model.predict(unseen)
-        model.observe(unseen, moved, matched=False)
+        model.observe(unseen, moved, Evidence(False))
         way += moved[0]
     assert 0.15 < way < 1.0
 
@@ -152,17 +152,17 @@ def test_a_robot_of_which_nothing_tells_may_go_on_all_the_way() -> None:
     place = np.zeros(3)
     for i in range(1, 6):
         place = compose(place, step)
-        model.observe(scan(0.5 * i, place), step, matched=True)
+        model.observe(scan(0.5 * i, place), step, Evidence(True))
     variances = np.zeros(3)
     for i in range(6, 16):
         moved, covariance = model.predict(scan(0.5 * i, place))
         assert moved == pytest.approx(np.zeros(3))
         variances += np.diag(covariance)
         assert model.lost is (i - 6 > 5)
-        model.observe(scan(0.5 * i, place), moved, matched=False)
+        model.observe(scan(0.5 * i, place), moved, Evidence(False))
     assert np.sqrt(variances) == pytest.approx([2.0, 2.0, 0.5], rel=0.02)
     assert model.pause(scan(8.0, place)) == pytest.approx(5.5)
-    model.observe(scan(8.0, place), np.zeros(3), matched=True)
+    model.observe(scan(8.0, place), np.zeros(3), Evidence(True))
     assert not model.lost
     assert model.predict(scan(8.5, place))[1][0, 0] < 0.01
 
@@ -172,10 +172,10 @@ def test_a_robot_that_came_to_rest_stays_though_a_crowd_hides_the_walls() -> Non
     model.start(scan(0.0, place))
     for i, step in enumerate((0.1, 0.1, 0.1, 0.06, 0.02), start=1):
         place = compose(place, pose(step, 0.0, 0.0))
-        model.observe(scan(0.2 * i, place), pose(step, 0.0, 0.0), matched=i < 4)
+        model.observe(scan(0.2 * i, place), pose(step, 0.0, 0.0), Evidence(i < 4))
     for i in range(6, 300):
         _, covariance = model.predict(scan(0.2 * i, place))
-        model.observe(scan(0.2 * i, place), np.zeros(3), matched=False)
+        model.observe(scan(0.2 * i, place), np.zeros(3), Evidence(False))
     assert covariance[0, 0] < 1e-4
     assert not model.lost
 
@@ -185,7 +185,7 @@ def test_a_robot_that_stood_still_before_stays() -> None:
     model.start(scan(0.0, np.zeros(3)))
     for i in range(1, 100):
         _, covariance = model.predict(scan(0.5 * i, np.zeros(3)))
-        model.observe(scan(0.5 * i, np.zeros(3)), np.zeros(3), matched=i < 3)
+        model.observe(scan(0.5 * i, np.zeros(3)), np.zeros(3), Evidence(i < 3))
     assert covariance[0, 0] < 1e-4
     assert not model.lost
 

@@ -13,6 +13,9 @@ from hsslam.se2 import Pose, wrap
 GATE = 16.27
 """Chi-square of 3 degrees of freedom, 99.9 %: two estimates further apart contradict each other."""
 
+GATE_ALONG = 10.83
+"""Chi-square of 1 degree of freedom, 99.9 %."""
+
 
 @kernel
 def rotated(covariance: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
@@ -73,7 +76,7 @@ def fuse(
     Returns
     -------
     (Pose, float64 (3, 3))
-        The weighed pose and its covariance; ``matched`` alone where the two contradict each other.
+        The weighed pose and its covariance; where the two contradict each other what `along_the_open` says.
     """
     innovation = matched - predicted
     innovation[2] = wrap(innovation[2])
@@ -83,7 +86,7 @@ def fuse(
         for j in range(3):
             distance += innovation[i] * information[i, j] * innovation[j]
     if distance > GATE:
-        return matched.copy(), covariance.copy()
+        return along_the_open(predicted, prior, matched, covariance)
     pose = predicted.copy()
     out = prior.copy()
     gain = np.zeros((3, 3))
@@ -100,6 +103,45 @@ def fuse(
     for i in range(3):
         for j in range(i):
             out[i, j] = out[j, i] = 0.5 * (out[i, j] + out[j, i])
+    return pose, out
+
+
+@kernel
+def along_the_open(
+    predicted: Pose, prior: NDArray[np.float64], matched: Pose, covariance: NDArray[np.float64]
+) -> tuple[Pose, NDArray[np.float64]]:
+    """Make one of two estimates that contradict each other: the matched one, moved along its long axis if that is open.
+
+    A corridor may deny odometry's heading, and knows nothing of the place along it: there odometry has a say, if it
+    knows more of that than the match does, and the two agree on it.
+
+    Parameters
+    ----------
+    predicted, prior, matched, covariance
+        As for `fuse`.
+
+    Returns
+    -------
+    (Pose, float64 (3, 3))
+        ``matched``, updated with the predicted pose's coordinate along the long axis of its covariance.
+    """
+    a, b, d = covariance[0, 0], covariance[0, 1], covariance[1, 1]
+    angle = 0.5 * math.atan2(2.0 * b, a - d)
+    ux, uy = math.cos(angle), math.sin(angle)
+    known = ux * ux * prior[0, 0] + 2.0 * ux * uy * prior[0, 1] + uy * uy * prior[1, 1]
+    left = ux * ux * a + 2.0 * ux * uy * b + uy * uy * d
+    off = ux * (predicted[0] - matched[0]) + uy * (predicted[1] - matched[1])
+    pose, out = matched.copy(), covariance.copy()
+    if known >= left or off * off > GATE_ALONG * (known + left):
+        return pose, out
+    along = np.empty(3)
+    for i in range(3):
+        along[i] = covariance[i, 0] * ux + covariance[i, 1] * uy
+    for i in range(3):
+        pose[i] += along[i] * off / (known + left)
+        for j in range(3):
+            out[i, j] -= along[i] * along[j] / (known + left)
+    pose[2] = wrap(pose[2])
     return pose, out
 
 
@@ -128,3 +170,14 @@ def of_inverse(covariance: NDArray[np.float64], pose: Pose) -> NDArray[np.float6
     change = np.array([[-c, -s, s * x - c * y], [s, -c, c * x + s * y], [0.0, 0.0, -1.0]])
     inverted: NDArray[np.float64] = change @ covariance @ change.T
     return inverted
+
+
+def share_left(prior: NDArray[np.float64], posterior: NDArray[np.float64]) -> float:
+    """Share of a position's variance along the direction in which it is least known that an update left: 1 for none.
+
+    Both covariances are (3, 3), in one frame; the direction is the posterior's.
+    """
+    a, b, d = float(posterior[0, 0]), float(posterior[0, 1]), float(posterior[1, 1])
+    angle = 0.5 * math.atan2(2.0 * b, a - d)
+    along = np.array([math.cos(angle), math.sin(angle), 0.0])
+    return float((along @ posterior @ along) / (along @ prior @ along))

@@ -294,8 +294,9 @@ class Locator:
     def _left_open(self, expected: Expectation, found: MatchResult) -> MatchResult:
         """An answer that leaves a direction open, with what is known of it in the widest window.
 
-        How far a window reaches is no news. What is open there, too, is left to odometry altogether, the more so the
-        more doubtful that is: the answer's place along a bare corridor is anywhere in the window, and would have a say.
+        How far a window reaches is no news. What is open there, too, is left to what is expected altogether, the more
+        so the more doubtful that is: the answer's place along a bare corridor is anywhere in the window, and would
+        have a say.
         """
         _, covariance, direction = assess(
             self._reference.surface,
@@ -304,7 +305,7 @@ class Locator:
             self._widest.half,
             self._matcher.config.score_distance,
         )
-        if expected.told and not math.isnan(direction):
+        if not math.isnan(direction):
             along = np.array([math.cos(direction), math.sin(direction), 0.0])
             if along @ expected.covariance @ along > DOUBTFUL * (along @ covariance @ along):
                 covariance += OPEN_STD**2 * np.outer(along, along)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,12 @@ LOST = 1.0
 FADING = 0.8
 """Share of a motion that is left a scan later where neither odometry nor a match tells of it."""
 
+LEFT_OPEN = 0.5
+"""A match that leaves more than this share of a position's variance along a direction tells nothing of the way."""
+
+SURE = (0.02, 0.25)
+"""A motion is known if its ends are to this (m), or to this share of the motion before."""
+
 REST_STD_XY = 0.002
 REST_STD_THETA = math.radians(0.05)
 """Standard deviations of odometry that reports no motion (m, rad)."""
@@ -59,12 +66,33 @@ def _diagonal(xy: float, theta: float) -> NDArray[np.float64]:
     return out
 
 
+@dataclass(frozen=True)
+class Evidence:
+    """What a match tells of the motion to a scan for which odometry says the same as for the last.
+
+    Attributes
+    ----------
+    matched : bool
+        Whether there is a match, and it is believed.
+    left : float
+        Share of the position's variance that it left where that is largest: 1 in a bare corridor.
+    deviation : float
+        Of the position, before or after, where it is least known (m): so much of the motion may be a correction.
+    """
+
+    matched: bool
+    left: float = 0.0
+    deviation: float = 0.0
+
+
 class MotionModel:
     """Predicts motion from scan to scan.
 
     A log without odometry, and an outage in the middle of one, look alike: the same odometry pose again and
     again while the scans tell of motion. The last motion, scaled to the time that passed, then stands in
-    (constant velocity), until odometry changes again.
+    (constant velocity), until odometry changes again. Along a corridor scans tell of turns only: there the robot is
+    taken to go on as when something last told how far it went, from where that was. Odometry that changes again may
+    tell of the last motion alone, or of all that it did not tell before: see `_step`.
 
     Parameters
     ----------
@@ -84,6 +112,8 @@ class MotionModel:
         self._told: Pose = np.zeros(3)
         self._told_at = 0.0
         self._untold = 0
+        self._meanwhile: Pose = np.zeros(3)
+        self._owed: Pose = np.zeros(3)
 
     @property
     def last_motion(self) -> Pose:
@@ -107,7 +137,8 @@ class MotionModel:
 
     def leaps(self, scan: LaserScan) -> bool:
         """Whether odometry's motion to a scan is unlike the one before: wheels slip, messages come late."""
-        return way(self._last_step, between(self._odometry, scan.odometry)) > LEAP
+        before = self._last_motion if self._meanwhile.any() else self._last_step
+        return way(before, self._step(scan)) > LEAP
 
     def paused(self, scan: LaserScan) -> bool:
         """Whether the recording paused before a scan, or its stamp was late."""
@@ -133,14 +164,30 @@ class MotionModel:
     def predict(self, scan: LaserScan) -> tuple[Pose, NDArray[np.float64]]:
         """Motion since the last scan, in its frame, and the motion's covariance (3, 3)."""
         if not self.silent:
-            moved = between(self._odometry, scan.odometry)
+            moved = self._step(scan)
             xy, theta = self._variances(moved)
             unsteady_xy, unsteady_theta = self._unsteady(moved)
             noise = _diagonal(xy + unsteady_xy, theta + unsteady_theta)
             return moved, noise + self._may_go_on() if self.still(scan) else noise
-        moved = self._last_motion * self._stretch(scan.stamp)
+        moved = self._last_motion * self._stretch(scan.stamp) + self._owed
+        step = moved if self.still(scan) else self._step(scan)
+        if way(moved, step) < LEAP:
+            moved = step
         xy, theta = self._variances(moved)
+        xy += self._owed[0] ** 2 + self._owed[1] ** 2
         return moved, _diagonal(xy + 0.05**2, theta + math.radians(3.0) ** 2)
+
+    def _step(self, scan: LaserScan) -> Pose:
+        """Odometry's motion to a scan, without what is known of it already.
+
+        Where odometry said the same for a while, it may have been late, and tell of all of the motion now, or have
+        missed it, and tell of the last one. Whichever goes on better as the robot went is believed.
+        """
+        step = between(self._odometry, scan.odometry)
+        if not self._meanwhile.any():
+            return step
+        late = between(self._meanwhile, step)
+        return late if way(self._last_motion, late) < way(self._last_motion, step) else step
 
     def velocity(self, scan: LaserScan) -> Pose:
         """Velocity (m/s, m/s, rad/s) from the last scan to this, in the robot's frame; 0 where stamps do not tell.
@@ -160,29 +207,43 @@ class MotionModel:
         step = np.array([scale * moved[0] + half * moved[1], scale * moved[1] - half * moved[0], moved[2]])
         return step / seconds
 
-    def observe(self, scan: LaserScan, motion: Pose, matched: bool) -> None:
-        """Take note of the motion from the last scan to this, and whether a match told it.
+    def observe(self, scan: LaserScan, motion: Pose, evidence: Evidence) -> None:
+        """Take note of the motion from the last scan to this, and what tells of it.
 
         A sweep whose beams were moved by too much velocity is matched too far back, by half of that: only its middle
         is where it seems to be. Velocities told from stamp to stamp would swing ever wider, from scan to scan.
         """
-        middle = scan.middle
+        middle, still = scan.middle, self.still(scan)
+        self._meanwhile = compose(self._meanwhile, motion) if still else np.zeros(3)
         motion = between(self._middle, compose(motion, middle))
         self._middle = middle
-        still, seconds = self.still(scan), self._clock.since_last(scan.stamp)
-        if self.silent and still and not matched:
-            motion = FADING * motion
-        if still and not (matched or self.silent):
-            self._untold += 1
-        else:
-            x, y, _ = motion.tolist()
-            at_speed = math.hypot(x, y) > AT_SPEED * seconds > 0.0
-            self._told = motion if at_speed else np.zeros(3)
-            self._told_at, self._untold = scan.stamp, 0
+        seconds = self._clock.since_last(scan.stamp)
+        was_silent = self.silent
         if not still:
             self._silent = 0
         elif _length(motion) > MOVING:
             self._silent += 1
+        known = not still or (
+            evidence.matched and evidence.deviation < max(SURE[0], SURE[1] * math.hypot(*self._told[:2]))
+        )
+        placed = known or (evidence.matched and evidence.left <= LEFT_OPEN)
+        guessed = was_silent and not evidence.matched
+        self._owed = np.zeros(3)
+        if self.silent and evidence.matched and not known:
+            x, y, _ = self._told.tolist()
+            if not (placed or was_silent):
+                self._owed = (self._untold + 1) * np.array([x, y, 0.0])
+            motion = np.array([x, y, motion[2]])
+        elif still and guessed:
+            motion = FADING * motion
+        if known or guessed:
+            x, y, _ = motion.tolist()
+            at_speed = math.hypot(x, y) > AT_SPEED * seconds > 0.0
+            self._told = motion if at_speed else np.zeros(3)
+        if placed or guessed:
+            self._told_at, self._untold = scan.stamp, 0
+        elif not was_silent:
+            self._untold += 1
         self._last_step = between(self._odometry, scan.odometry)
         self._last_motion, self._last_seconds = motion, seconds
         self._odometry = scan.odometry
@@ -207,10 +268,11 @@ class MotionModel:
     def _may_go_on(self) -> NDArray[np.float64]:
         """What it adds to a motion's covariance (3, 3) that nothing tells of it, nor of those before.
 
-        The robot may stand, as odometry says, or go on as it went at speed when something last told: all the way.
+        The robot may stand, as odometry says, or go on as it went at speed when something last told: all the way. So it
+        may where a match told how far it went while odometry was still.
         """
         before = self._untold
-        if not before:
+        if not (before or self._silent):
             return np.zeros((3, 3))
         growth = (before + 1) ** 2 - (before**2 if before > 1 else 0)
         xy, theta = self._told[0] ** 2 + self._told[1] ** 2, self._told[2] ** 2

@@ -16,9 +16,9 @@ from hsslam.matching.interface import Matcher
 from hsslam.scan import LaserScan
 from hsslam.se2 import Points, Pose, Poses, between, compose
 from hsslam.slam.expectation import Expectation
-from hsslam.slam.fusion import fuse, rotated
+from hsslam.slam.fusion import fuse, largest_variance, rotated, share_left
 from hsslam.slam.locator import UNFIT, Locator, is_piece
-from hsslam.slam.motion import MotionModel
+from hsslam.slam.motion import Evidence, MotionModel
 from hsslam.slam.randomness import Purpose, generator
 from hsslam.slam.sessions import Pause
 from hsslam.slam.stopwatch import Stopwatch
@@ -129,7 +129,11 @@ class Tracker:
         self.motion, self.noise = moved, rotated(noise, predicted[2])
         pose, posterior = compose(newest, tracked.relative), rotated(tracked.covariance, -newest[2])
         self.guessed = not tracked.matched and self._motion.still(scan) and self.pause is None
-        self._motion.observe(scan, between(self._pose, pose), tracked.matched)
+        evidence = Evidence(tracked.matched)
+        if tracked.matched and self._motion.still(scan):
+            variance = max(largest_variance(self._covariance), largest_variance(posterior))
+            evidence = Evidence(True, share_left(prior, posterior), math.sqrt(variance))
+        self._motion.observe(scan, between(self._pose, pose), evidence)
         self._pose, self._covariance = pose, posterior
         self._matched = tracked.matched
         return tracked
