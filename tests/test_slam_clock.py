@@ -108,11 +108,11 @@ def test_late_stamps_do_not_stretch_the_motion_that_stands_in_for_odometry() -> 
     scans = [LaserScan(float(t), np.full(3, 1.0), ScanGeometry(0.0, 0.1), odometry=rest) for t in stamps]
     model.start(scans[0])
     for scan in scans[1:20]:
-        model.observe(scan, step, matched=True)
+        model.observe(scan, step, Evidence(True))
     assert model.silent
     for scan in scans[20:]:
         assert model.predict(scan)[0] == pytest.approx(step)
-        model.observe(scan, step, matched=True)
+        model.observe(scan, step, Evidence(True))
 
 
 @pytest.mark.parametrize(

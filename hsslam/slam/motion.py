@@ -22,6 +22,9 @@ MOVING = 0.02
 LEAP = 0.2
 """Odometry leaps when its motion from one scan to the next differs by more than this from the one before (m + rad)."""
 
+UNLIKE = 0.1
+"""A motion that a match tells is unlike odometry's at this distance (m + rad): part of it mended an error."""
+
 UNSTEADY = 0.3
 """Share of the change of odometry's motion, from one scan to the next, that may be its error (standard deviation)."""
 
@@ -113,6 +116,7 @@ class MotionModel:
         self._told_at = 0.0
         self._untold = 0
         self._meanwhile: Pose = np.zeros(3)
+        self._held = 0
         self._owed: Pose = np.zeros(3)
 
     @property
@@ -130,6 +134,11 @@ class MotionModel:
         """Whether the robot may have gone far while neither odometry nor a match told of its motion."""
         return self._untold * math.hypot(self._told[0], self._told[1]) > LOST
 
+    @property
+    def held(self) -> bool:
+        """Whether odometry said the same of the last scan as of the one before."""
+        return self._held > 0
+
     def still(self, scan: LaserScan) -> bool:
         """Whether odometry says the same of a scan as of the last."""
         same: bool = scan.odometry.tolist() == self._odometry.tolist()
@@ -137,8 +146,10 @@ class MotionModel:
 
     def leaps(self, scan: LaserScan) -> bool:
         """Whether odometry's motion to a scan is unlike the one before: wheels slip, messages come late."""
-        before = self._last_motion if self._meanwhile.any() else self._last_step
-        return way(before, self._step(scan)) > LEAP
+        step = between(self._odometry, scan.odometry)
+        if self.late(scan):
+            return way(self._told, step / (self._held + 1)) > LEAP
+        return way(self._last_step, step) > LEAP
 
     def paused(self, scan: LaserScan) -> bool:
         """Whether the recording paused before a scan, or its stamp was late."""
@@ -152,7 +163,7 @@ class MotionModel:
         """Whether the recording paused before a scan, and no stamp was late for long."""
         return self._clock.paused(scan.stamp) and self._clock.steady(scan.stamp)
 
-    def _held(self, scan: LaserScan) -> bool:
+    def _holds(self, scan: LaserScan) -> bool:
         """Whether odometry says the same as for the last scan, or said so then, although the robot moved."""
         return _length(self._last_motion) > MOVING and (self.still(scan) or not self._last_step.any())
 
@@ -170,24 +181,28 @@ class MotionModel:
             noise = _diagonal(xy + unsteady_xy, theta + unsteady_theta)
             return moved, noise + self._may_go_on() if self.still(scan) else noise
         moved = self._last_motion * self._stretch(scan.stamp) + self._owed
-        step = moved if self.still(scan) else self._step(scan)
-        if way(moved, step) < LEAP:
-            moved = step
+        if not self.still(scan):
+            step = self._step(scan)
+            if self.late(scan) or way(moved, step) < LEAP:
+                moved = step
         xy, theta = self._variances(moved)
         xy += self._owed[0] ** 2 + self._owed[1] ** 2
         return moved, _diagonal(xy + 0.05**2, theta + math.radians(3.0) ** 2)
 
-    def _step(self, scan: LaserScan) -> Pose:
-        """Odometry's motion to a scan, without what is known of it already.
+    def late(self, scan: LaserScan) -> bool:
+        """Whether odometry changes that said the same for a while, and tells all of the motion now.
 
-        Where odometry said the same for a while, it may have been late, and tell of all of the motion now, or have
-        missed it, and tell of the last one. Whichever goes on better as the robot went is believed.
+        It may have missed that instead, and tell of the last one: what is more like the motion before is believed.
         """
+        if not self._held or self.still(scan):
+            return False
         step = between(self._odometry, scan.odometry)
-        if not self._meanwhile.any():
-            return step
-        late = between(self._meanwhile, step)
-        return late if way(self._last_motion, late) < way(self._last_motion, step) else step
+        return way(self._told, step / (self._held + 1)) < way(self._told, step)
+
+    def _step(self, scan: LaserScan) -> Pose:
+        """Odometry's motion to a scan, without what scans told of it already where it is late."""
+        step = between(self._odometry, scan.odometry)
+        return between(self._meanwhile, step) if self.late(scan) else step
 
     def velocity(self, scan: LaserScan) -> Pose:
         """Velocity (m/s, m/s, rad/s) from the last scan to this, in the robot's frame; 0 where stamps do not tell.
@@ -199,7 +214,7 @@ class MotionModel:
         if seconds == 0.0:
             return np.zeros(3)
         seconds = max(seconds, abs(scan.geometry.time_increment) * len(scan.ranges))
-        goes_on = self._last_seconds > 0.0 and (self.leaps(scan) or self._held(scan))
+        goes_on = self._last_seconds > 0.0 and (self.leaps(scan) or self._holds(scan))
         moved = self._last_motion * self._stretch(scan.stamp) if goes_on else self.predict(scan)[0]
         # The step of a motion at constant velocity: the logarithm of SE(2).
         half = 0.5 * moved[2]
@@ -214,7 +229,9 @@ class MotionModel:
         is where it seems to be. Velocities told from stamp to stamp would swing ever wider, from scan to scan.
         """
         middle, still = scan.middle, self.still(scan)
+        late, held = self.late(scan), self._held
         self._meanwhile = compose(self._meanwhile, motion) if still else np.zeros(3)
+        self._held = held + 1 if still else 0
         motion = between(self._middle, compose(motion, middle))
         self._middle = middle
         seconds = self._clock.since_last(scan.stamp)
@@ -236,6 +253,9 @@ class MotionModel:
             motion = np.array([x, y, motion[2]])
         elif still and guessed:
             motion = FADING * motion
+        if late:
+            usual = between(self._odometry, scan.odometry) / (held + 1)
+            motion = motion if way(motion, usual) < UNLIKE else usual
         if known or guessed:
             x, y, _ = motion.tolist()
             at_speed = math.hypot(x, y) > AT_SPEED * seconds > 0.0

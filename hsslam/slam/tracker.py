@@ -75,6 +75,7 @@ class Tracker:
         self._motion = MotionModel(config.graph)
         self._pose: Pose = np.zeros(3)
         self._covariance: NDArray[np.float64] = np.zeros((3, 3))
+        self._held_covariance = self._covariance
         self.usual_score = 1.0
         """What the last scans scored."""
         self._matched = False
@@ -114,7 +115,8 @@ class Tracker:
         """
         moved, noise = self._motion.predict(scan)
         noise = rotated(noise, -self._pose[2])
-        predicted, prior = compose(self._pose, moved), self._covariance + noise
+        before = self._held_covariance if self._motion.late(scan) else self._covariance
+        predicted, prior = compose(self._pose, moved), before + noise
         tracked = known if known is not None else self._match(scan, points, predicted, prior)
         newest = self._submap.newest
         unfit = not tracked.matched or tracked.score < self.usual_score - UNFIT
@@ -134,6 +136,8 @@ class Tracker:
             variance = max(largest_variance(self._covariance), largest_variance(posterior))
             evidence = Evidence(True, share_left(prior, posterior), math.sqrt(variance))
         self._motion.observe(scan, between(self._pose, pose), evidence)
+        if not self._motion.held:
+            self._held_covariance = posterior
         self._pose, self._covariance = pose, posterior
         self._matched = tracked.matched
         return tracked
@@ -159,7 +163,7 @@ class Tracker:
         """
         if self.pause is not None:
             self._submap = LocalSubmap(self._matcher, self._config.keyframes.submap_size)
-            self._covariance = np.zeros((3, 3))
+            self._covariance = self._held_covariance = np.zeros((3, 3))
         with self._stopwatch.measure("submap"):
             self._submap.add(points, laser, tracked.relative)
         self._stand_on_newest()
@@ -187,7 +191,9 @@ class Tracker:
         """Take the newest keyframe's pose for the last scan's, which it is, in the frame of the current submap."""
         heading = self._pose[2]
         self._pose = self._submap.newest
-        self._covariance = rotated(self._covariance, heading - self._pose[2])
+        turned = heading - self._pose[2]
+        self._covariance = rotated(self._covariance, turned)
+        self._held_covariance = rotated(self._held_covariance, turned)
 
     def _match(
         self, scan: LaserScan, points: Points, predicted: Pose, prior: NDArray[np.float64]
