@@ -40,6 +40,9 @@ FADING = 0.8
 LEFT_OPEN = 0.5
 """A match that leaves more than this share of a position's variance along a direction tells nothing of the way."""
 
+LEAST_CHANGE = 0.03
+"""By so much a motion may change from one scan to the next (m), even of a robot at rest."""
+
 SURE = (0.02, 0.25)
 """A motion is known if its ends are to this (m), or to this share of the motion before."""
 
@@ -86,6 +89,14 @@ class Evidence:
     matched: bool
     left: float = 0.0
     deviation: float = 0.0
+
+
+def _adapted(before: Pose, motion: Pose, deviation: float) -> Pose:
+    """A motion whose way is known to a deviation (m), between the one before and what it seems: robots go steadily."""
+    changes = (UNSTEADY * math.hypot(before[0], before[1])) ** 2 + LEAST_CHANGE**2
+    gain = changes / (changes + (2.0 * deviation) ** 2)
+    way_x, way_y = before[:2] + gain * (motion[:2] - before[:2])
+    return np.array([way_x, way_y, motion[2]])
 
 
 class MotionModel:
@@ -247,16 +258,16 @@ class MotionModel:
         guessed = was_silent and not evidence.matched
         self._owed = np.zeros(3)
         if self.silent and evidence.matched and not known:
-            x, y, _ = self._told.tolist()
+            before = self._last_motion if was_silent else self._told
             if not (placed or was_silent):
-                self._owed = (self._untold + 1) * np.array([x, y, 0.0])
-            motion = np.array([x, y, motion[2]])
+                self._owed = (self._untold + 1) * np.array([before[0], before[1], 0.0])
+            motion = _adapted(before, motion, evidence.deviation)
         elif still and guessed:
             motion = FADING * motion
         if late:
             usual = between(self._odometry, scan.odometry) / (held + 1)
             motion = motion if way(motion, usual) < UNLIKE else usual
-        if known or guessed:
+        if known or guessed or (self.silent and placed):
             x, y, _ = motion.tolist()
             at_speed = math.hypot(x, y) > AT_SPEED * seconds > 0.0
             self._told = motion if at_speed else np.zeros(3)
