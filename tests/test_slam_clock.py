@@ -19,7 +19,7 @@ from hsslam.datasets.simulator import EXACT, DriveModel, SimulatedDataset
 from hsslam.scan import LaserScan, ScanGeometry
 from hsslam.se2 import between_many
 from hsslam.slam.clock import DOUBTED, ScanClock
-from hsslam.slam.motion import MotionModel
+from hsslam.slam.motion import Evidence, MotionModel
 from hsslam.slam.pipeline import Slam
 
 Stamps = NDArray[np.float64]

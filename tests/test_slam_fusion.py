@@ -18,6 +18,7 @@ from hsslam.slam.fusion import (
     largest_variance,
     of_inverse,
     rotated,
+    share_left,
     squared_mahalanobis,
 )
 
@@ -112,6 +113,45 @@ def test_beyond_the_gate_the_match_alone_counts(sigmas: float, believed: bool) -
     else:
         np.testing.assert_allclose(pose, 0.5 * matched)
         np.testing.assert_allclose(posterior, 0.5 * covariance)
+
+
+@settings(deadline=None)
+@given(st.floats(-3.1, 3.1), st.floats(0.02, 0.1), st.floats(-0.2, 0.2), st.floats(0.2, 10.0))
+def test_a_corridor_that_denies_the_heading_has_no_say_in_the_way(
+    angle: float, known: float, off: float, open_std: float
+) -> None:
+    """A Kalman update of the match with the one coordinate that the prediction knows better."""
+    along = np.array([math.cos(angle), math.sin(angle), 0.0])
+    across = np.array([-along[1], along[0], 0.0])
+    prior = np.diag([known**2, known**2, 1e-6])
+    covariance = open_std**2 * np.outer(along, along) + 1e-4 * np.outer(across, across)
+    covariance[2, 2] = 1e-6
+    matched = off * along + np.array([0.0, 0.0, 0.05])
+    pose, posterior = fuse(np.zeros(3), prior, matched, covariance)
+    gain = covariance @ along / (known**2 + open_std**2)
+    np.testing.assert_allclose(pose, matched - gain * off, atol=1e-12)
+    np.testing.assert_allclose(posterior, covariance - np.outer(gain, along @ covariance), atol=1e-12)
+    assert pose[2] == pytest.approx(0.05)
+    assert abs(pose[:2] @ along[:2]) <= abs(off) * known**2 / (known**2 + open_std**2) + 1e-12
+
+
+def test_a_prediction_that_is_off_along_the_corridor_too_has_none() -> None:
+    prior, covariance = np.diag([1e-4, 1e-4, 1e-6]), np.diag([4e-2, 1e-4, 1e-6])
+    matched = np.array([0.8, 0.0, 0.05])
+    pose, posterior = fuse(np.zeros(3), prior, matched, covariance)
+    assert (pose == matched).all()
+    assert (posterior == covariance).all()
+
+
+@settings(deadline=None)
+@given(covariances(), covariances())
+def test_an_update_leaves_a_share(prior: Matrix, covariance: Matrix) -> None:
+    posterior = np.linalg.inv(np.linalg.inv(prior) + np.linalg.inv(covariance))
+    assert share_left(prior, prior) == pytest.approx(1.0)
+    values, vectors = np.linalg.eigh(posterior[:2, :2])
+    least_known = vectors[:, 1]
+    expected = values[1] / (least_known @ prior[:2, :2] @ least_known)
+    assert share_left(prior, posterior) == pytest.approx(expected, rel=1e-6)
 
 
 def test_headings_are_fused_across_the_seam() -> None:

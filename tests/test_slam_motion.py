@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from hsslam.config import Config, GraphSection, load_config
+from hsslam.datasets.catalogue import open_dataset
 from hsslam.datasets.simulator import SimulatedDataset
 from hsslam.scan import LaserScan, ScanGeometry
 from hsslam.se2 import between_many, compose, pose
@@ -93,6 +94,62 @@ def test_nobody_goes_on_for_ever_without_being_seen() -> None:
     assert 0.15 < way < 1.0
 
 
+def going(model: MotionModel, step: NDArray[np.float64], scans: int) -> NDArray[np.float64]:
+    """Odometry tells of some scans' motion; where it ends."""
+    place = np.zeros(3)
+    model.start(scan(0.0, place))
+    for i in range(1, scans + 1):
+        place = compose(place, step)
+        model.observe(scan(0.25 * i, place), step, Evidence(True))
+    return place
+
+
+def test_late_odometry_does_not_tell_again_what_matches_told() -> None:
+    model, step = MotionModel(RULES), pose(0.2, 0.0, 0.03)
+    place = going(model, step, 5)
+    for i in range(6, 9):
+        model.observe(scan(0.25 * i, place), step, Evidence(True, 0.1, 0.005))
+    for _ in range(4):
+        place = compose(place, step)
+    assert model.late(scan(2.25, place))
+    assert not model.leaps(scan(2.25, place))
+    moved, _ = model.predict(scan(2.25, place))
+    assert moved == pytest.approx(step, abs=1e-9)
+
+
+def test_odometry_that_missed_some_motion_tells_of_the_last() -> None:
+    model, step = MotionModel(RULES), pose(0.2, 0.0, 0.03)
+    place = going(model, step, 5)
+    for i in range(6, 9):
+        model.observe(scan(0.25 * i, place), step, Evidence(True, 0.1, 0.005))
+    here = scan(2.25, compose(place, step))
+    assert not model.late(here)
+    moved, _ = model.predict(here)
+    assert moved == pytest.approx(step, abs=1e-9)
+
+
+def test_odometry_that_jumps_while_matches_tell_of_rest_leaps() -> None:
+    model, rest = MotionModel(RULES), np.zeros(3)
+    model.start(scan(0.0, rest))
+    for i in range(1, 30):
+        model.observe(scan(0.25 * i, rest), rest, Evidence(True, 0.3, 0.003))
+    assert model.leaps(scan(7.5, pose(2.0, 0.0, 0.0)))
+
+
+def test_along_a_corridor_the_robot_goes_on_as_it_went_and_what_was_missed_is_made_up_for() -> None:
+    """Matches that leave the way open say that it stands, for so does odometry; that it turns, they know."""
+    model, step = MotionModel(RULES), pose(0.2, 0.0, 0.0)
+    place = going(model, step, 5)
+    for i in (6, 7):
+        model.observe(scan(0.25 * i, place), pose(0.0, 0.0, 0.03), Evidence(True, 1.0, 0.4))
+    assert model.silent
+    moved, covariance = model.predict(scan(2.0, place))
+    assert moved[0] == pytest.approx(3 * 0.2, abs=0.02)
+    assert covariance[0, 0] > 0.3**2
+    model.observe(scan(2.0, place), moved, Evidence(True, 1.0, 0.4))
+    assert model.predict(scan(2.25, place))[0][0] == pytest.approx(0.2, abs=0.02)
+
+
 def largest_error(result: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
     def seen(poses: NDArray[np.float64]) -> NDArray[np.float64]:
         return between_many(np.tile(poses[0], (len(poses), 1)), poses)
@@ -135,6 +192,19 @@ def test_poses_that_nothing_told_of_are_counted(frozen: bool, first: int | None)
     told = Slam(load_config(overrides=["loops.enabled=false"])).solve(scans).statistics
     assert told["first_guessed"] == first
     assert told["guessed"] >= len(blind) if frozen else told["guessed"] == 0
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_odometry_with_every_fourth_scan_leads_along_a_corridor(seed: int) -> None:
+    """It came on top of what had been made of the way meanwhile: 1.5 and 3.0 m off, where walls tell nothing of it."""
+    corridor = open_dataset("corridor", scans=300)
+    scans = list(corridor.scans())
+    held = [replace(scan, odometry=scans[i - i % 4].odometry) for i, scan in enumerate(scans)]
+    slam = Slam(Config(seed=seed))
+    tracked = np.array([slam.process(scan)[0].pose for scan in held])  # type: ignore[union-attr]
+    truth = corridor.truth()
+    assert truth is not None
+    assert largest_error(tracked, truth.poses[:300]) < 0.7
 
 
 def test_stamps_that_repeat_do_no_harm() -> None:

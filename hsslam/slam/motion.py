@@ -94,7 +94,7 @@ class Evidence:
 def _adapted(before: Pose, motion: Pose, deviation: float) -> Pose:
     """A motion whose way is known to a deviation (m), between the one before and what it seems: robots go steadily."""
     changes = (UNSTEADY * math.hypot(before[0], before[1])) ** 2 + LEAST_CHANGE**2
-    gain = changes / (changes + (2.0 * deviation) ** 2)
+    gain = changes / (changes + deviation**2)
     way_x, way_y = before[:2] + gain * (motion[:2] - before[:2])
     return np.array([way_x, way_y, motion[2]])
 
@@ -128,6 +128,7 @@ class MotionModel:
         self._untold = 0
         self._meanwhile: Pose = np.zeros(3)
         self._held = 0
+        self._placed = True
         self._owed: Pose = np.zeros(3)
 
     @property
@@ -156,11 +157,17 @@ class MotionModel:
         return same
 
     def leaps(self, scan: LaserScan) -> bool:
-        """Whether odometry's motion to a scan is unlike the one before: wheels slip, messages come late."""
-        step = between(self._odometry, scan.odometry)
-        if self.late(scan):
-            return way(self._told, step / (self._held + 1)) > LEAP
-        return way(self._last_step, step) > LEAP
+        """Whether odometry's motion to a scan is unlike the one before: wheels slip, messages come late.
+
+        Late odometry does not leap if it goes on from where matches told that the robot is, or, where they told
+        nothing of its way, as fast as it went.
+        """
+        step = self._step(scan)
+        if not self.late(scan):
+            return way(self._last_step, step) > LEAP
+        if self._untold or not self._placed:
+            return way(self._told, between(self._odometry, scan.odometry) / (self._held + 1)) > LEAP
+        return way(self._last_motion, step) > LEAP
 
     def paused(self, scan: LaserScan) -> bool:
         """Whether the recording paused before a scan, or its stamp was late."""
@@ -261,7 +268,8 @@ class MotionModel:
             before = self._last_motion if was_silent else self._told
             if not (placed or was_silent):
                 self._owed = (self._untold + 1) * np.array([before[0], before[1], 0.0])
-            motion = _adapted(before, motion, evidence.deviation)
+            doubt = 1.0 if placed and self._placed else 2.0
+            motion = _adapted(before, motion, doubt * evidence.deviation)
         elif still and guessed:
             motion = FADING * motion
         if late:
@@ -271,6 +279,7 @@ class MotionModel:
             x, y, _ = motion.tolist()
             at_speed = math.hypot(x, y) > AT_SPEED * seconds > 0.0
             self._told = motion if at_speed else np.zeros(3)
+        self._placed = placed
         if placed or guessed:
             self._told_at, self._untold = scan.stamp, 0
         elif not was_silent:
