@@ -210,9 +210,10 @@ class MotionModel:
     def late(self, scan: LaserScan) -> bool:
         """Whether odometry changes that said the same for a while, and tells all of the motion now.
 
-        It may have missed that instead, and tell of the last one: what is more like the motion before is believed.
+        It may have missed that instead, and tell of the last one: what is more like the motion before is believed. What
+        a robot at rest does is start, and where it stood is known better by now.
         """
-        if not self._held or self.still(scan):
+        if not (self._held and self._told.any()) or self.still(scan):
             return False
         step = between(self._odometry, scan.odometry)
         return way(self._told, step / (self._held + 1)) < way(self._told, step)
