@@ -148,9 +148,8 @@ def compile_some(names: IO[str], done: IO[str]) -> None:
     for line in names:
         module, _, name = line.strip().rpartition(".")
         arguments, _ = sigutils.normalize_signature(f"({KERNELS[line.strip()]},)")
-        getattr(import_module(module), name).compile(
-            arguments
-        )  # types, for numba keeps under what it is given
+        # Types, not text: numba keeps what it compiles under what it was given.
+        getattr(import_module(module), name).compile(arguments)
         print(name, file=done, flush=True)
 
 
